@@ -1,0 +1,65 @@
+"""High reliefs from 3D scenes: an Open3D geometry plugin."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from o3d_relief.errors import FileError, MeshError, ParameterError, ReliefError, SolverError
+    from o3d_relief.linalg.laplacian import cotangent_laplacian
+    from o3d_relief.params import ReliefParams, View
+    from o3d_relief.pipeline import Relief, make_relief
+    from o3d_relief.scene.demo import demo_scene
+    from o3d_relief.scene.read import read_mesh
+    from o3d_relief.scene.write import write_mesh
+    from o3d_relief.show.render import render
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "FileError",
+    "MeshError",
+    "ParameterError",
+    "Relief",
+    "ReliefError",
+    "ReliefParams",
+    "SolverError",
+    "View",
+    "cotangent_laplacian",
+    "demo_scene",
+    "make_relief",
+    "read_mesh",
+    "render",
+    "write_mesh",
+]
+
+_HOME = {
+    "FileError": "errors",
+    "MeshError": "errors",
+    "ParameterError": "errors",
+    "ReliefError": "errors",
+    "SolverError": "errors",
+    "ReliefParams": "params",
+    "View": "params",
+    "Relief": "pipeline",
+    "make_relief": "pipeline",
+    "cotangent_laplacian": "linalg.laplacian",
+    "demo_scene": "scene.demo",
+    "read_mesh": "scene.read",
+    "write_mesh": "scene.write",
+    "render": "show.render",
+}
+
+
+def __getattr__(name: str) -> object:
+    # Open3D takes seconds to import: a name is loaded when it is first used, so that `--help` is instant.
+    if name not in _HOME:
+        raise AttributeError(f"module 'o3d_relief' has no attribute {name!r}")
+    value = getattr(import_module(f"o3d_relief.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,23 @@
+"""The errors that this package raises: one clear sentence each."""
+
+__all__ = ["FileError", "MeshError", "ParameterError", "ReliefError", "SolverError"]
+
+
+class ReliefError(Exception):
+    """Base of every error that this package raises on purpose."""
+
+
+class ParameterError(ReliefError, ValueError):
+    """A parameter is out of range, or contradicts another one or the scene."""
+
+
+class MeshError(ReliefError, ValueError):
+    """A mesh from which no relief can be made."""
+
+
+class FileError(ReliefError, OSError):
+    """A file that cannot be read or written."""
+
+
+class SolverError(ReliefError, RuntimeError):
+    """A linear system that could not be solved to the accuracy asked for."""

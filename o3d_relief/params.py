@@ -1,0 +1,213 @@
+"""What the user chooses: the view of the scene and the parameters of the relief."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from o3d_relief.errors import ParameterError
+
+__all__ = ["ReliefParams", "View"]
+
+_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+Triple = tuple[float, float, float]
+
+
+def _check_number(name: str, value: object) -> float:
+    if isinstance(value, bool):
+        raise ParameterError(f"{name} must be a number. Got {value!r} instead.")
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        raise ParameterError(f"{name} must be a number. Got {value!r} instead.") from None
+    if not math.isfinite(number):
+        raise ParameterError(f"{name} must be finite. Got {value!r} instead.")
+    return number
+
+
+def _check_range(name: str, value: object, low: float, high: float = math.inf) -> float:
+    number = _check_number(name, value)
+    if not low <= number <= high:
+        wanted = f"at least {low:g}" if high == math.inf else f"between {low:g} and {high:g}"
+        raise ParameterError(f"{name} must be {wanted}. Got {value!r} instead.")
+    return number
+
+
+def _check_integer(name: str, value: object, low: int, high: int) -> int:
+    number = _check_number(name, value)
+    if number != int(number):
+        raise ParameterError(f"{name} must be a whole number. Got {value!r} instead.")
+    return int(_check_range(name, int(number), low, high))
+
+
+def _check_triple(name: str, value: object) -> Triple:
+    if isinstance(value, str) or not hasattr(value, "__len__") or len(value) != 3:
+        raise ParameterError(f"{name} must be three numbers. Got {value!r} instead.")
+    x, y, z = (_check_number(name, item) for item in value)  # type: ignore[attr-defined]
+    return (x, y, z)
+
+
+def _check_direction(name: str, value: object) -> Triple:
+    """Turn 'x', '-y', ... or three numbers into a direction."""
+    if isinstance(value, str):
+        axis = _AXES.get(value.lower().lstrip("+-"))
+        if axis is None or len(value) > 2:
+            raise ParameterError(f"{name} must be x, -x, y, -y, z, -z or three numbers. Got {value!r} instead.")
+        sign = -1.0 if value.startswith("-") else 1.0
+        return (sign * axis[0], sign * axis[1], sign * axis[2])
+    direction = _check_triple(name, value)
+    if not any(direction):
+        raise ParameterError(f"{name} must not be the zero vector. Got {value!r} instead.")
+    return direction
+
+
+@dataclass(frozen=True, kw_only=True)
+class View:
+    """How the scene is looked at.
+
+    Parameters
+    ----------
+    front : three numbers or "x", "-x", "y", ...
+        Direction from the scene to the viewer, in the input's frame. It becomes the relief's z axis.
+    up : three numbers or "x", "-x", "y", ...
+        Direction that points up, in the input's frame; only its part across `front` counts.
+    viewpoint : three numbers, optional
+        The point u that decides what is visible, in the relief frame and in relief units (the larger
+        of the scene's x and y extents is 100, the rearmost point lies at z = 0, the centre at x = y = 0).
+        It must lie in front of the scene. None: infinitely far.
+    vanishing_point : three numbers, optional
+        The point g behind the relief plane (z < 0) towards which the scene is drawn (section 3.1), in
+        the same frame and unit. None: infinitely far, no deformation.
+
+    Raises
+    ------
+    ParameterError
+        A value that is not a direction or a point, or `up` parallel to `front`.
+
+    Examples
+    --------
+    >>> View(front="-y", up="z").front
+    (-0.0, -1.0, -0.0)
+    """
+
+    front: Triple | str = (0.0, 0.0, 1.0)
+    up: Triple | str = (0.0, 1.0, 0.0)
+    viewpoint: Triple | None = None
+    vanishing_point: Triple | None = None
+
+    def __post_init__(self) -> None:
+        front = _check_direction("front", self.front)
+        up = _check_direction("up", self.up)
+        cross = math.hypot(
+            front[1] * up[2] - front[2] * up[1],
+            front[2] * up[0] - front[0] * up[2],
+            front[0] * up[1] - front[1] * up[0],
+        )
+        if cross <= 1e-9 * math.hypot(*front) * math.hypot(*up):
+            raise ParameterError(f"up must not be parallel to front. Got front={front} and up={up} instead.")
+        object.__setattr__(self, "front", front)
+        object.__setattr__(self, "up", up)
+        for name in ("viewpoint", "vanishing_point"):
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, _check_triple(name, value))
+        if self.vanishing_point is not None and self.vanishing_point[2] >= 0.0:
+            raise ParameterError(
+                "vanishing_point must lie behind the relief plane (z < 0). "
+                f"Got z = {self.vanishing_point[2]:g} instead."
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReliefParams:
+    """The parameters of the method.
+
+    Parameters
+    ----------
+    k : int
+        Number of clusters, and so of attenuation points at most. More points bring more of the scene
+        to the plane and lower the depth, at the price of more deformation.
+    beta : float or sequence of float
+        Attenuation factor of Eq. 3, per relief unit: one number, or one for each attenuation point (each
+        cluster). Smaller values let parts stand further out; 0 leaves the differentials as they are.
+    discard_above : float
+        The paper's t1: points with a relative differential above it are dropped.
+    attach_below : float
+        The paper's t2: points with a relative differential below it are attached to the relief plane.
+    max_order_error : float
+        The paper's t3: vertices with a depth order error (Eq. 8) of at least this are solved again.
+    blend : float
+        The paper's t: share of first order against second order differentials in the restoration.
+    alpha : float, optional
+        The paper's alpha, the largest compression ratio, in (0, 1]. None: no compression.
+    alpha_min : float, optional
+        The smallest compression ratio, in (0, alpha]. None: half of the largest.
+    depth : float, optional
+        Wanted depth of the relief above the plane, in the input's unit; the compression is chosen to
+        meet it exactly. A relief that is shallower already is left as it is. Excludes `alpha`.
+    smooth_points : bool
+        Also restore a disc around every kept attenuation point, which removes the small pimples that
+        the paper's own rule (False) leaves there.
+    seed : int
+        Seed of the clustering.
+
+    Raises
+    ------
+    ParameterError
+        A value out of its range, or two that exclude each other.
+
+    Examples
+    --------
+    >>> ReliefParams(k=64, depth=12).depth
+    12.0
+    """
+
+    k: int = 128
+    beta: float | Sequence[float] = 0.2
+    discard_above: float = 0.6
+    attach_below: float = 0.3
+    max_order_error: float = 0.2
+    blend: float = 0.9
+    alpha: float | None = None
+    alpha_min: float | None = None
+    depth: float | None = None
+    smooth_points: bool = True
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        set_field = object.__setattr__
+        set_field(self, "k", _check_integer("k", self.k, 1, 2**31 - 1))
+        if isinstance(self.beta, str) or not hasattr(self.beta, "__len__"):
+            set_field(self, "beta", _check_range("beta", self.beta, 0.0))
+        else:
+            set_field(self, "beta", tuple(_check_range("beta", item, 0.0) for item in self.beta))
+        for name in ("discard_above", "attach_below", "max_order_error", "blend"):
+            set_field(self, name, _check_range(name, getattr(self, name), 0.0, 1.0))
+        if self.attach_below > self.discard_above:
+            raise ParameterError(
+                "attach_below must not exceed discard_above. "
+                f"Got {self.attach_below:g} and {self.discard_above:g} instead."
+            )
+        if not isinstance(self.smooth_points, bool):
+            raise ParameterError(f"smooth_points must be True or False. Got {self.smooth_points!r} instead.")
+        set_field(self, "seed", _check_integer("seed", self.seed, 0, 2**32 - 1))
+        self._check_compression()
+
+    def _check_compression(self) -> None:
+        if self.alpha is not None and self.depth is not None:
+            raise ParameterError("alpha and depth exclude each other: give one of them.")
+        for name in ("alpha", "alpha_min", "depth"):
+            value = getattr(self, name)
+            if value is None:
+                continue
+            number = _check_number(name, value)
+            if number <= 0.0 or (name != "depth" and number > 1.0):
+                wanted = "greater than 0" if name == "depth" else "greater than 0 and at most 1"
+                raise ParameterError(f"{name} must be {wanted}. Got {value!r} instead.")
+            object.__setattr__(self, name, number)
+        if self.alpha_min is not None and self.alpha_min > (1.0 if self.alpha is None else self.alpha):
+            raise ParameterError(
+                f"alpha_min must not exceed alpha. Got {self.alpha_min:g} and {self.alpha:g} instead."
+            )

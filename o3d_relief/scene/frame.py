@@ -1,0 +1,128 @@
+"""The relief frame: S is z = 0, x to the right, y up, z towards the viewer; 100 units wide or high."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o3d_relief.errors import MeshError
+
+__all__ = ["RELIEF_UNITS", "Frame", "relief_frame", "to_relief_units"]
+
+RELIEF_UNITS = 100.0
+"""The larger of the scene's x and y extents in relief units."""
+
+_GRID = 2.0**20
+"""Steps per relief unit of the grid to which solver coordinates are rounded (1e-8 of the extent).
+
+A scene that is moved, turned and scaled differs by rounding errors only. On the grid these errors
+vanish, so that every decision (what is visible, which cluster, which point) is the same.
+"""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Frame:
+    """Where the relief frame lies in the input's frame.
+
+    Attributes
+    ----------
+    rotation : (3, 3) float64
+        Rows are the relief's x, y and z axes in the input's frame.
+    origin : (3,) float64
+        The centre of S in the input's frame.
+    unit : float
+        Length of one relief unit in the input's unit.
+    """
+
+    rotation: NDArray[np.float64]
+    origin: NDArray[np.float64]
+    unit: float
+
+    @property
+    def to_scene(self) -> NDArray[np.float64]:
+        """(4, 4) matrix from the relief frame, in the input's unit, to the input's frame."""
+        matrix = np.eye(4)
+        matrix[:3, :3] = self.rotation.T
+        matrix[:3, 3] = self.origin
+        return matrix
+
+
+def _axes(front: tuple[float, float, float], up: tuple[float, float, float]) -> NDArray[np.float64]:
+    z = np.asarray(front, dtype=np.float64)
+    z = z / np.linalg.norm(z)
+    x = np.cross(np.asarray(up, dtype=np.float64), z)
+    x = x / np.linalg.norm(x)
+    return np.stack([x, np.cross(z, x), z])
+
+
+def relief_frame(
+    vertices: NDArray[np.float64],
+    front: tuple[float, float, float] = (0.0, 0.0, 1.0),
+    up: tuple[float, float, float] = (0.0, 1.0, 0.0),
+) -> Frame:
+    """Put the relief plane behind a scene.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+        Vertices in the input's frame and unit; all of them count.
+    front : three floats
+        Direction from the scene to the viewer.
+    up : three floats
+        Direction that points up; not parallel to `front`.
+
+    Returns
+    -------
+    Frame
+        S touches the rearmost vertex; x and y are centred on the scene's extents.
+
+    Raises
+    ------
+    MeshError
+        From `front` all vertices lie on one line or point.
+
+    Examples
+    --------
+    >>> frame = relief_frame(np.array([[0, 0, 1], [4, 0, 1], [4, 2, 3.0]]))
+    >>> frame.unit, frame.origin.tolist()
+    (0.04, [2.0, 1.0, 1.0])
+    """
+    rotation = _axes(front, up)
+    middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+    turned = (vertices - middle) @ rotation.T
+    low, high = turned.min(axis=0), turned.max(axis=0)
+    unit = float((high - low)[:2].max()) / RELIEF_UNITS
+    across = turned[:, :2] - turned[:, :2].mean(axis=0)
+    spread = np.linalg.eigvalsh(across.T @ across)
+    size = float(np.abs(vertices - middle).max())
+    if unit * RELIEF_UNITS <= 1e-9 * size or spread[0] <= 1e-18 * spread[1]:
+        raise MeshError(
+            "The scene is seen edge-on: all its vertices lie on one line as seen from "
+            f"front={tuple(float(c) for c in front)}; choose another front."
+        )
+    centre = (low + high) / 2
+    origin = middle + rotation.T @ np.array([centre[0], centre[1], low[2]])
+    return Frame(rotation=rotation, origin=origin, unit=unit)
+
+
+def to_relief_units(
+    vertices: NDArray[np.float64], frame: Frame, *, on_grid: bool = False
+) -> NDArray[np.float64]:
+    """Bring vertices into the relief frame, in relief units.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+        Vertices in the input's frame and unit.
+    frame : Frame
+    on_grid : bool
+        Round to a grid of 2^-20 relief units, 1e-8 of the extent.
+
+    Returns
+    -------
+    (n, 3) float64
+    """
+    moved = (vertices - frame.origin) @ frame.rotation.T / frame.unit
+    return np.round(moved * _GRID) / _GRID if on_grid else moved

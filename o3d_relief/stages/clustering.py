@@ -1,0 +1,70 @@
+"""k-means on x and y (section 3.2)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+from sklearn.cluster import KMeans
+from threadpoolctl import threadpool_limits
+
+__all__ = ["cluster_vertices"]
+
+_CELLS = 256
+"""Side of the grid of cells whose weighted means stand for their vertices on large meshes."""
+
+_SAMPLES_PER_CLUSTER = 32
+"""Cells are used where they leave at least this many samples for each cluster."""
+
+
+def cluster_vertices(
+    xy: NDArray[np.float64], k: int, *, seed: int = 0
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Partition vertices by k-means on x and y only.
+
+    The scene is not partitioned in depth: one cluster is a column through all its layers. scikit-learn's
+    KMeans runs on the vertices or, where there are more than 256 x 256 of them, on the weighted means of
+    the cells of a 256 x 256 grid, and each vertex then goes to its nearest centre.
+
+    Parameters
+    ----------
+    xy : (n, 2) float64
+    k : int
+        Number of clusters; one for each distinct position where there are fewer than k of them.
+    seed : int
+
+    Returns
+    -------
+    labels : (n,) int64
+    centers : (k, 2) float64
+
+    Examples
+    --------
+    >>> labels, centers = cluster_vertices(np.array([[0.0, 0], [0, 1], [9, 0], [9, 1]]), 2)
+    >>> sorted(centers.tolist())
+    [[0.0, 0.5], [9.0, 0.5]]
+    """
+    samples, weights = _samples(xy, k)
+    distinct = len(np.unique(samples, axis=0))
+    kmeans = KMeans(n_clusters=min(k, distinct), n_init=1, random_state=seed)
+    # The order in which threads add up their partial means would change the last digits.
+    with threadpool_limits(limits=1):
+        kmeans.fit(samples, sample_weight=weights)
+    centers = np.asarray(kmeans.cluster_centers_, dtype=np.float64)
+    _, labels = cKDTree(centers).query(xy)
+    return np.asarray(labels, dtype=np.int64), centers
+
+
+def _samples(xy: NDArray[np.float64], k: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return what stands for the vertices in the k-means: (s, 2) positions and (s,) weights."""
+    if len(xy) <= _CELLS**2:
+        return xy, np.ones(len(xy))
+    low = xy.min(axis=0)
+    step = float((xy.max(axis=0) - low).max()) / _CELLS
+    cell = np.minimum((xy - low) // step, _CELLS - 1).astype(np.int64) @ np.array([1, _CELLS])
+    weights = np.bincount(cell, minlength=_CELLS**2).astype(np.float64)
+    sums = np.stack([np.bincount(cell, weights=c, minlength=_CELLS**2) for c in xy.T], axis=1)
+    full = weights > 0
+    if full.sum() < _SAMPLES_PER_CLUSTER * k:
+        return xy, np.ones(len(xy))
+    return sums[full] / weights[full, None], weights[full]

@@ -1,0 +1,66 @@
+"""Which vertices the viewpoint u sees (section 3.2)."""
+
+from __future__ import annotations
+
+import numpy as np
+import open3d as o3d
+from numpy.typing import NDArray
+
+from o3d_relief.errors import ParameterError
+
+__all__ = ["visible_vertices"]
+
+_NEAR = 1e-4
+"""A ray leaves its vertex by this share of the scene's size before it can hit anything, because it would
+hit the vertex's own triangles."""
+
+
+def visible_vertices(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    *,
+    viewpoint: tuple[float, float, float] | None = None,
+) -> NDArray[np.bool_]:
+    """Find the vertices from which the open segment to the viewpoint u is free.
+
+    Cast with Open3D's RaycastingScene, which computes in float32: the scene is brought into the unit box
+    first.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+        In the relief frame.
+    faces : (m, 3) int64
+    viewpoint : three floats, optional
+        u, in front of every vertex; infinitely far along +z where omitted.
+
+    Returns
+    -------
+    (n,) bool
+
+    Raises
+    ------
+    ParameterError
+        u does not lie in front of the scene.
+    """
+    front = float(vertices[:, 2].max())
+    if viewpoint is not None and not viewpoint[2] > front:
+        raise ParameterError(
+            f"viewpoint must lie in front of the scene (z > {front:g} relief units). "
+            f"Got z = {viewpoint[2]:g} instead."
+        )
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    middle, size = (low + high) / 2, float((high - low).max())
+    unit_box = ((vertices - middle) / size).astype(np.float32)
+    scene = o3d.t.geometry.RaycastingScene()
+    scene.add_triangles(o3d.core.Tensor(unit_box), o3d.core.Tensor(faces.astype(np.uint32)))
+    rays = np.zeros((len(vertices), 6), dtype=np.float32)
+    rays[:, 5] = 1.0
+    if viewpoint is not None:
+        towards = (np.asarray(viewpoint, dtype=np.float64) - vertices) / size
+        # Past the scene's front nothing can be hit: unit directions keep the offset of a far u small.
+        towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+        rays[:, 3:] = towards
+    rays[:, :3] = unit_box + np.float32(_NEAR) * rays[:, 3:]
+    occluded = scene.test_occlusions(o3d.core.Tensor(rays))
+    return np.asarray(~occluded.numpy().astype(bool))
