@@ -54,13 +54,21 @@ def _check_direction(name: str, value: object) -> Triple:
     if isinstance(value, str):
         axis = _AXES.get(value.lower().lstrip("+-"))
         if axis is None or len(value) > 2:
-            raise ParameterError(f"{name} must be x, -x, y, -y, z, -z or three numbers. Got {value!r} instead.")
+            raise ParameterError(
+                f"{name} must be x, -x, y, -y, z, -z or three numbers. Got {value!r} instead."
+            )
         sign = -1.0 if value.startswith("-") else 1.0
         return (sign * axis[0], sign * axis[1], sign * axis[2])
     direction = _check_triple(name, value)
     if not any(direction):
         raise ParameterError(f"{name} must not be the zero vector. Got {value!r} instead.")
     return direction
+
+
+def _check_beta(value: float | Sequence[float]) -> float | tuple[float, ...]:
+    if isinstance(value, int | float | str) or not hasattr(value, "__len__"):
+        return _check_range("beta", value, 0.0)
+    return tuple(_check_range("beta", item, 0.0) for item in value)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -179,10 +187,7 @@ class ReliefParams:
     def __post_init__(self) -> None:
         set_field = object.__setattr__
         set_field(self, "k", _check_integer("k", self.k, 1, 2**31 - 1))
-        if isinstance(self.beta, str) or not hasattr(self.beta, "__len__"):
-            set_field(self, "beta", _check_range("beta", self.beta, 0.0))
-        else:
-            set_field(self, "beta", tuple(_check_range("beta", item, 0.0) for item in self.beta))
+        set_field(self, "beta", _check_beta(self.beta))
         for name in ("discard_above", "attach_below", "max_order_error", "blend"):
             set_field(self, name, _check_range(name, getattr(self, name), 0.0, 1.0))
         if self.attach_below > self.discard_above:

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 import open3d as o3d
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from o3d_relief.errors import MeshError, ParameterError
 from o3d_relief.linalg.laplacian import cotangent_laplacian
-from o3d_relief.params import ReliefParams, View
+from o3d_relief.params import ReliefParams, Triple, View
 from o3d_relief.records import (
     AttenuationStage,
     ClustersStage,
@@ -216,7 +216,8 @@ def make_relief(
 def _frame(vertices: NDArray[np.float64], faces: NDArray[np.int64], view: View) -> Frame:
     used = np.zeros(len(vertices), dtype=bool)
     used[faces] = True
-    frame = relief_frame(vertices[used], view.front, view.up)
+    front, up = cast(Triple, view.front), cast(Triple, view.up)  # View has checked and converted both
+    frame = relief_frame(vertices[used], front, up)
     # Vertices that no face uses may be anything, infinite even: they take no part.
     vertices[~used] = frame.origin
     return frame
@@ -354,17 +355,17 @@ def _restoration(
 ) -> RestorationStage:
     index = points.kept_index
     own_cluster = clusters.labels[index]
-    radii = cluster_radii(vertices, clusters.labels, len(clusters.centers))[own_cluster]
+    radii = cluster_radii(vertices[:, :2], clusters.labels, len(clusters.centers))[own_cluster]
     error = order_errors(vertices, z, index, radii)
     high = error >= params.max_order_error
     counts = {"high_errors": int(high.sum())}
     if params.smooth_points:
-        widths = cluster_radii(vertices[:, :2], clusters.labels, len(clusters.centers))[own_cluster]
-        high |= smoothing_discs(vertices, index, widths)
-    restored = restore(vertices, laplacian, z, high, index, blend=params.blend)
+        high |= smoothing_discs(vertices, index, radii)
+    restored = restore(vertices, laplacian, z, high, index, visible, blend=params.blend)
     counts |= {
         "solved": int(restored.solved.sum()),
         "points_held": restored.points_held,
+        "set_on_plane": restored.set_on_plane,
         "visible_behind": _behind(restored.z, visible),
     }
     return RestorationStage(order_error=error, solved=restored.solved, z=restored.z, counts=counts)

@@ -60,9 +60,7 @@ def mended_cotangents(
     return cotangents, int(sliver.sum())
 
 
-def cotangent_laplacian(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64]
-) -> tuple[sp.csr_array, int]:
+def cotangent_laplacian(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> tuple[sp.csr_array, int]:
     """Assemble the symmetric cotangent Laplacian C.
 
     C_ij = -(cot a_ij + cot b_ij) / 2 off the diagonal and rows that sum to zero: the weights of
@@ -87,9 +85,7 @@ def cotangent_laplacian(
     start = faces[:, [1, 2, 0]].ravel()
     end = faces[:, [2, 0, 1]].ravel()
     weight = 0.5 * cotangents.ravel()
-    half = sp.coo_array(
-        (weight, (np.minimum(start, end), np.maximum(start, end))), shape=(n, n)
-    ).tocsr()
+    half = sp.coo_array((weight, (np.minimum(start, end), np.maximum(start, end))), shape=(n, n)).tocsr()
     weights = half + half.T
     diagonal = sp.dia_array((weights.sum(axis=1)[None, :], [0]), shape=(n, n))
     return (diagonal - weights).tocsr(), slivers

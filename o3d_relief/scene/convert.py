@@ -33,7 +33,9 @@ def mesh_arrays(mesh: o3d.geometry.TriangleMesh) -> tuple[NDArray[np.float64], N
         out of range.
     """
     if not isinstance(mesh, o3d.geometry.TriangleMesh):
-        raise MeshError(f"The scene must be an open3d.geometry.TriangleMesh. Got {type(mesh).__name__} instead.")
+        raise MeshError(
+            f"The scene must be an open3d.geometry.TriangleMesh. Got {type(mesh).__name__} instead."
+        )
     vertices = np.array(mesh.vertices, dtype=np.float64).reshape(-1, 3)
     faces = np.array(mesh.triangles, dtype=np.int64).reshape(-1, 3)
     if len(vertices) == 0:

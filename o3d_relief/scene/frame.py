@@ -125,4 +125,4 @@ def to_relief_units(
     (n, 3) float64
     """
     moved = (vertices - frame.origin) @ frame.rotation.T / frame.unit
-    return np.round(moved * _GRID) / _GRID if on_grid else moved
+    return np.asarray(np.round(moved * _GRID) / _GRID if on_grid else moved)

@@ -50,7 +50,8 @@ def forced_perspective(
     g = np.asarray(vanishing_point, dtype=np.float64)
     if g[2] >= min(0.0, float(vertices[:, 2].min())):
         raise ParameterError(
-            f"vanishing_point must lie behind the relief plane and the scene (z < 0). Got z = {g[2]:g} instead."
+            "vanishing_point must lie behind the relief plane and the scene (z < 0). "
+            f"Got z = {g[2]:g} instead."
         )
     if u_z < front:
         raise ParameterError(
@@ -59,4 +60,4 @@ def forced_perspective(
     moved = vertices.copy()
     share = (vertices[:, 2] - u_z) / (g[2] - u_z)
     moved[:, :2] -= (vertices[:, :2] - g[:2]) * share[:, None]
-    return moved
+    return np.asarray(moved)

@@ -9,6 +9,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
+from scipy.spatial.distance import pdist
 
 from o3d_relief.linalg.solve import solve_spd
 
@@ -20,7 +21,7 @@ _SAME_HEIGHT = 1e-6
 _DISC = 0.3
 """Radius of the disc around a point that is smoothed, in cluster radii."""
 
-_DIRECTIONS = 128
+_DIRECTIONS = 64
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -34,24 +35,27 @@ class Restoration:
         The vertices that were solved again.
     points_held : int
         Fixed points that stayed fixed because nothing else held their component.
+    set_on_plane : int
+        Vertices that were set onto S.
     """
 
     z: NDArray[np.float64]
     solved: NDArray[np.bool_]
     points_held: int
+    set_on_plane: int
 
 
-def cluster_radii(
-    positions: NDArray[np.float64], labels: NDArray[np.int64], k: int
-) -> NDArray[np.float64]:
-    """Find half of the largest distance between two vertices of each cluster.
+def cluster_radii(xy: NDArray[np.float64], labels: NDArray[np.int64], k: int) -> NDArray[np.float64]:
+    """Find half of the largest distance between two vertices of each cluster, in x and y.
 
-    The largest distance is measured between the vertices that are extreme in one of 128 directions spread
-    over the sphere, which finds it to within one percent in linear time.
+    Clusters are columns through the scene. Were depth to count, the neighbourhoods in a deep scene would
+    reach through all of it, and order errors would no longer be local. The largest distance is measured
+    between the vertices that are extreme in one of 64 directions, which finds it to within a thousandth
+    in linear time.
 
     Parameters
     ----------
-    positions : (n, 2) or (n, 3) float64
+    xy : (n, 2) float64
     labels : (n,) int64
     k : int
         Number of clusters.
@@ -63,29 +67,21 @@ def cluster_radii(
 
     Examples
     --------
-    >>> cluster_radii(np.array([[0.0, 0, 0], [6, 0, 8]]), np.array([0, 0]), 1).tolist()
+    >>> cluster_radii(np.array([[0.0, 0], [6, 8]]), np.array([0, 0]), 1).tolist()
     [5.0]
     """
-    # A spiral of golden-angle steps over the half sphere.
-    step = np.arange(_DIRECTIONS)
-    height = (step + 0.5) / _DIRECTIONS
-    angle = step * np.pi * (3.0 - np.sqrt(5.0))
-    flat = np.sqrt(1.0 - height**2)
-    directions = np.stack([flat * np.cos(angle), flat * np.sin(angle), height], axis=1)
-    directions = directions[:, : positions.shape[1]]
+    angle = np.arange(_DIRECTIONS) * np.pi / _DIRECTIONS
+    directions = np.stack([np.cos(angle), np.sin(angle)])
     order = np.argsort(labels, kind="stable")
     bounds = np.searchsorted(labels[order], np.arange(k + 1))
     radii = np.zeros(k)
     for cluster in range(k):
-        members = positions[order[bounds[cluster] : bounds[cluster + 1]]]
+        members = xy[order[bounds[cluster] : bounds[cluster + 1]]]
         if len(members) > 2 * _DIRECTIONS:
-            along = members @ directions.T
+            along = members @ directions
             members = members[np.concatenate([along.argmin(axis=0), along.argmax(axis=0)])]
         if len(members) > 1:
-            squared = (members**2).sum(axis=1)
-            between = squared[:, None] + squared - 2.0 * members @ members.T
-            a, b = np.unravel_index(between.argmax(), between.shape)
-            radii[cluster] = np.linalg.norm(members[a] - members[b]) / 2.0
+            radii[cluster] = pdist(members).max() / 2.0
     return radii
 
 
@@ -113,7 +109,7 @@ def depth_order_error(before: NDArray[np.float64], after: NDArray[np.float64]) -
     low, high = _rank_interval(before)
     new_low, new_high = _rank_interval(after)
     apart = np.maximum(np.maximum(new_low - high, low - new_high), 0)
-    return apart / len(before)
+    return np.asarray(apart / len(before))
 
 
 def _rank_interval(heights: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -187,6 +183,7 @@ def restore(
     z: NDArray[np.float64],
     high: NDArray[np.bool_],
     index: NDArray[np.int64],
+    visible: NDArray[np.bool_],
     *,
     blend: float = 0.9,
 ) -> Restoration:
@@ -197,6 +194,10 @@ def restore(
     weights: the paper's Voronoi areas would make the blend depend on the unit, and are unstable on
     slivers. Multiplied by D the operator is the symmetric t C + (1 - t) C D^-1 C, and as in the
     construction it is solved for the displacement.
+
+    The fixed points held the surface in front of S; set free, some of it would sink behind. What is
+    visible and in front must stay there: where it does not, the lowest vertices are set onto S and the
+    rest is solved again, until none is behind.
 
     Parameters
     ----------
@@ -210,6 +211,7 @@ def restore(
         The vertices to solve again.
     index : (q,) int64
         The fixed points; they stay fixed in a component of which every vertex is high.
+    visible : (n,) bool
     blend : float
         t in [0, 1], the share of first order differentials.
 
@@ -231,19 +233,57 @@ def restore(
     anchored = np.bincount(label, weights=~solved, minlength=components) > 0
     solved &= anchored[label]
 
-    original = vertices[:, 2]
-    displacement = z - original
-    free = np.flatnonzero(solved)
-    result = z.copy()
-    if len(free):
-        rows = laplacian[free]
+    in_front = visible & (z >= 0.0)
+    on_plane = np.zeros(len(z), dtype=bool)
+    result = z
+    system = _System(laplacian, np.flatnonzero(solved), blend)
+    while True:
+        fixed = np.where(on_plane, 0.0, z) - vertices[:, 2]
+        result = system.solve(vertices[:, 2], fixed, on_plane)
+        behind = in_front & ~on_plane & (result < -_SAME_HEIGHT)
+        if not behind.any():
+            break
+        on_plane |= _lowest(laplacian, result, behind)
+    return Restoration(z=result, solved=solved, points_held=len(held), set_on_plane=int(on_plane.sum()))
+
+
+class _System:
+    """The rows t C + (1 - t) C D^-1 C of some vertices."""
+
+    def __init__(self, laplacian: sp.csr_array, rows: NDArray[np.int64], blend: float) -> None:
+        first = laplacian[rows]
         weight_sum = laplacian.diagonal()
         inverse = np.where(weight_sum > 0.0, 1.0 / np.where(weight_sum > 0.0, weight_sum, 1.0), 0.0)
-        second = rows @ sp.diags_array(inverse) @ laplacian
-        operator = (blend * rows + (1.0 - blend) * second).tocsr()
-        outside = np.where(solved, 0.0, displacement)
-        answer = solve_spd(
-            operator[:, free].tocsr(), -(operator @ outside), similar=rows[:, free].tocsr()
+        second = first @ sp.diags_array(inverse) @ laplacian
+        self._rows = rows
+        self._first = first
+        self._operator = (blend * first + (1.0 - blend) * second).tocsr()
+
+    def solve(
+        self, original: NDArray[np.float64], displacement: NDArray[np.float64], held: NDArray[np.bool_]
+    ) -> NDArray[np.float64]:
+        """Return the new heights; `displacement` counts where a vertex is no row, or held."""
+        moving = ~held[self._rows]
+        columns = self._rows[moving]
+        outside = displacement.copy()
+        outside[columns] = 0.0
+        operator = self._operator[moving]
+        outside[columns] = solve_spd(
+            operator[:, columns].tocsr(),
+            -(operator @ outside),
+            similar=self._first[moving][:, columns].tocsr(),
         )
-        result[free] = original[free] + answer
-    return Restoration(z=result, solved=solved, points_held=len(held))
+        return np.asarray(original + outside)
+
+
+def _lowest(
+    laplacian: sp.csr_array, z: NDArray[np.float64], candidates: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Mark the candidates that no neighbouring candidate undercuts."""
+    among = laplacian[np.flatnonzero(candidates)][:, np.flatnonzero(candidates)].tocoo()
+    heights = z[candidates]
+    undercut = np.zeros(len(heights), dtype=bool)
+    undercut[among.row[heights[among.col] < heights[among.row]]] = True
+    marked = np.zeros(len(z), dtype=bool)
+    marked[np.flatnonzero(candidates)[~undercut]] = True
+    return marked

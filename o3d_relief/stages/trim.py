@@ -136,7 +136,9 @@ def _cut_faces(
     # Walk around each face: a corner that is not behind stays, an edge that crosses gives a cut vertex.
     following = np.roll(faces, -1, axis=1)
     crosses = side * np.roll(side, -1, axis=1) < 0
-    front_first = np.where((side > 0)[:, :, None], np.stack([faces, following], 2), np.stack([following, faces], 2))
+    front_first = np.where(
+        (side > 0)[:, :, None], np.stack([faces, following], 2), np.stack([following, faces], 2)
+    )
     edges, cut_number = np.unique(front_first[crosses], axis=0, return_inverse=True)
     walk = np.full((len(faces), 6), -1, dtype=np.int64)
     walk[:, 0::2] = np.where(side >= 0, faces, -1)

@@ -1,0 +1,137 @@
+"""Files that appear whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from pathlib import Path
+
+from o3d_relief.errors import FileError
+
+__all__ = ["check_exists", "check_place", "write_bytes", "write_files"]
+
+
+def check_exists(path: str | Path) -> None:
+    """Check that there is a file to read.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Raises
+    ------
+    FileError
+        Nothing there, or a folder.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise FileError(f"{path} is a folder, not a file.")
+    if not path.exists():
+        raise FileError(f"{path} does not exist.")
+
+
+def check_place(path: str | Path) -> None:
+    """Check, before any long work, that a file can be written.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file to be written. It may exist already: it will be replaced.
+
+    Raises
+    ------
+    FileError
+        A folder in place of a file, a folder that is missing or in which nothing can be written.
+    """
+    path = Path(path)
+    try:
+        _check(path)
+    except OSError as error:  # a name that is too long, a folder that may not be entered
+        if isinstance(error, FileError):
+            raise
+        raise FileError(f"{path} cannot be written: {error.strerror}.") from error
+
+
+def _check(path: Path) -> None:
+    if path.is_dir():
+        raise FileError(f"{path} is a folder: give the name of a file in it.")
+    if not path.parent.exists():
+        raise FileError(f"{path} cannot be written, the folder {path.parent} is missing: make it first.")
+    if not path.parent.is_dir():
+        raise FileError(f"{path} cannot be written, {path.parent} is not a folder: choose another place.")
+    if not os.access(path.parent, os.W_OK | os.X_OK):
+        raise FileError(
+            f"{path} cannot be written, the folder {path.parent} is read-only: choose another one."
+        )
+
+
+def write_bytes(path: str | Path, content: bytes) -> None:
+    """Write one file, all or nothing.
+
+    Parameters
+    ----------
+    path : str or Path
+    content : bytes
+
+    Raises
+    ------
+    FileError
+        The file cannot be written.
+    """
+    path = Path(path)
+    write_files(path, {path.name: content})
+
+
+def write_files(path: str | Path, files: dict[str, bytes]) -> None:
+    """Write a file and those that belong to it, all or nothing.
+
+    They are written under other names in the same folder and then renamed, the last one last: after a
+    failure the folder is as it was.
+
+    Parameters
+    ----------
+    path : str or Path
+        The main file, for its folder and for messages.
+    files : dict of str to bytes
+        Contents by name; the main file last.
+
+    Raises
+    ------
+    FileError
+        The files cannot be written.
+    """
+    path = Path(path)
+    check_place(path)
+    try:
+        _place(path.parent, files)
+    except OSError as error:
+        raise FileError(f"{path} cannot be written: {error.strerror or error}.") from error
+
+
+def _place(folder: Path, files: dict[str, bytes]) -> None:
+    main = list(files)[-1]
+    work = Path(tempfile.mkdtemp(prefix=".o3d-relief-", dir=folder))
+    moved = []
+    try:
+        (work / "new").mkdir()
+        (work / "old").mkdir()
+        for name, content in files.items():
+            if (folder / name).is_dir():
+                raise IsADirectoryError(f"{folder / name} is a folder")
+            (work / "new" / name).write_bytes(content)
+        for name in files:
+            if name != main:
+                moved.append(name)
+                if (folder / name).exists():
+                    (folder / name).replace(work / "old" / name)
+            (work / "new" / name).replace(folder / name)
+    except BaseException:
+        for name in moved:
+            if (work / "old" / name).exists():
+                (work / "old" / name).replace(folder / name)
+            elif not (work / "new" / name).exists():
+                (folder / name).unlink()
+        raise
+    finally:
+        shutil.rmtree(work, ignore_errors=True)

@@ -1,0 +1,53 @@
+import numpy as np
+import open3d as o3d
+import pytest
+import scipy.sparse as sp
+
+from o3d_relief import SolverError, cotangent_laplacian
+from o3d_relief.linalg.solve import solve_spd
+from shapes import hills
+
+
+def _system(side):
+    laplacian, _ = cotangent_laplacian(*hills(side))
+    matrix = laplacian[1:][:, 1:].tocsr()
+    return matrix, np.random.default_rng(0).normal(size=matrix.shape[0])
+
+
+@pytest.mark.parametrize("side", [20, 70])
+def test_small_and_large_systems_are_solved_to_the_tolerance(side):
+    matrix, right = _system(side)
+    found = solve_spd(matrix, right)
+    assert np.linalg.norm(matrix @ found - right) <= 1e-9 * np.linalg.norm(right)
+
+
+def test_both_ways_agree():
+    matrix, right = _system(70)
+    # Two copies of one system exceed the size up to which it is solved directly.
+    double = sp.block_diag([matrix, matrix]).tocsr()
+    found = solve_spd(double, np.tile(right, 2))
+    half = sp.linalg.splu(matrix.tocsc()).solve(right)
+    assert found == pytest.approx(np.tile(half, 2), abs=1e-6 * np.abs(half).max())
+
+
+def test_same_bytes_whatever_the_number_of_threads():
+    matrix, right = _system(70)
+    once = solve_spd(matrix, right)
+    threads = o3d.utility.get_max_threads()
+    o3d.utility.set_max_threads(1)
+    try:
+        assert solve_spd(matrix, right).tobytes() == once.tobytes()
+    finally:
+        o3d.utility.set_max_threads(threads)
+
+
+def test_zero_right_hand_side_and_no_unknowns():
+    matrix, right = _system(20)
+    assert not solve_spd(matrix, 0 * right).any()
+    assert solve_spd(sp.csr_array((0, 0)), np.zeros(0)).shape == (0,)
+
+
+def test_unreachable_tolerance_is_an_error():
+    matrix, right = _system(20)
+    with pytest.raises(SolverError, match="was solved to"):
+        solve_spd(matrix, right, tolerance=1e-30)

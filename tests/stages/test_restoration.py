@@ -1,0 +1,114 @@
+import numpy as np
+import pytest
+from scipy.spatial.distance import pdist
+
+import oracle
+from o3d_relief import cotangent_laplacian
+from o3d_relief.stages.construction import construct
+from o3d_relief.stages.restoration import (
+    cluster_radii,
+    depth_order_error,
+    order_errors,
+    restore,
+    smoothing_discs,
+)
+from shapes import hills, joined, moved
+
+INDEX = np.array([60, 220])
+
+
+def _bent(side=17):
+    vertices, faces = hills(side)
+    laplacian, _ = cotangent_laplacian(vertices, faces)
+    z = construct(vertices, laplacian, INDEX, np.array([30.0, -30.0])).z
+    high = smoothing_discs(vertices, INDEX, np.array([60.0, 60.0]))
+    return (vertices, faces), laplacian, z, high
+
+
+def test_radii_agree_with_all_distances():
+    rng = np.random.default_rng(0)
+    xy = rng.normal(size=(3000, 2)) * [3, 1]
+    labels = rng.integers(0, 4, 3000)
+    radii = cluster_radii(xy, labels, 5)
+    exact = [pdist(xy[labels == c]).max() / 2 for c in range(4)]
+    assert radii[:4] == pytest.approx(exact, rel=2e-3)
+    assert radii[4] == 0.0
+
+
+def test_swapped_ends_by_hand():
+    assert depth_order_error(np.array([1.0, 2, 3]), np.array([3.0, 2, 1])) == pytest.approx([2 / 3, 0, 2 / 3])
+
+
+def test_flat_floor_has_no_order_to_lose():
+    floor = np.full(50, 2.0)
+    assert not depth_order_error(floor, np.random.default_rng(0).normal(size=50)).any()
+
+
+def test_order_that_is_kept_is_no_error():
+    z = np.random.default_rng(0).normal(size=50)
+    assert not depth_order_error(z, 3 * z - 7).any()
+
+
+def test_errors_agree_with_the_literal_equation():
+    rng = np.random.default_rng(3)
+    vertices, z = rng.uniform(0, 10, (120, 3)), rng.uniform(0, 10, 120)
+    index, radii = np.array([4, 50]), np.array([3.0, 6.0])
+    found = order_errors(vertices, z, index, radii)
+    assert found == pytest.approx(oracle.order_errors(vertices, z, index, radii), abs=1e-12)
+
+
+@pytest.mark.parametrize("blend", [0.0, 0.5, 0.9, 1.0])
+def test_agrees_with_the_literal_appendix(blend):
+    shape, laplacian, z, high = _bent()
+    nothing_visible = np.zeros(len(z), dtype=bool)
+    found = restore(shape[0], laplacian, z, high, INDEX, nothing_visible, blend=blend)
+    assert np.array_equal(found.solved, high)
+    assert found.z == pytest.approx(oracle.restore(shape, z, high, blend), abs=1e-6)
+
+
+def test_only_high_vertices_move():
+    shape, laplacian, z, high = _bent()
+    found = restore(shape[0], laplacian, z, high, INDEX, np.zeros(len(z), dtype=bool))
+    assert np.array_equal(found.z[~high], z[~high])
+    assert (found.z[INDEX] != z[INDEX]).all()
+
+
+def test_spike_is_removed():
+    shape, laplacian, z, high = _bent()
+    found = restore(shape[0], laplacian, z, high, INDEX, np.zeros(len(z), dtype=bool))
+    assert (
+        np.abs(laplacian @ (found.z - shape[0][:, 2])).max()
+        < 0.3 * np.abs(laplacian @ (z - shape[0][:, 2])).max()
+    )
+
+
+def test_nothing_visible_sinks_behind_the_plane():
+    shape, laplacian, z, _ = _bent()
+    z = z - z[INDEX[1]]  # the lowest point, pulled down, is attached to the plane
+    high = smoothing_discs(shape[0], INDEX[:1], np.array([60.0]))
+    pulled = z.copy()
+    pulled[high] += 1.0
+    visible = np.ones(len(z), dtype=bool)
+    lowered = pulled - pulled[high].min()
+    found = restore(shape[0], laplacian, lowered, high, INDEX, visible)
+    assert not ((found.z < -1e-6) & (lowered >= 0)).any()
+
+
+def test_no_high_vertices_change_nothing():
+    shape, laplacian, z, high = _bent()
+    found = restore(shape[0], laplacian, z, np.zeros_like(high), INDEX, np.zeros_like(high))
+    assert np.array_equal(found.z, z)
+
+
+def test_wholly_high_component_is_held_by_its_points():
+    part = hills(5)
+    shape = joined(part, moved(part, (300, 0, 0)))
+    laplacian, _ = cotangent_laplacian(*shape)
+    index = np.array([12])
+    z = construct(shape[0], laplacian, index, np.array([1.0])).z
+    high = np.ones(50, dtype=bool)
+    found = restore(shape[0], laplacian, z, high, index, np.zeros(50, dtype=bool))
+    assert found.points_held == 1
+    assert found.z[12] == 1.0
+    assert np.array_equal(found.z[25:], z[25:])
+    assert not found.solved[25:].any()

@@ -1,0 +1,70 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from o3d_relief import ParameterError, ReliefParams, View
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"k": 0}, "k must be between 1 and"),
+        ({"k": 2.5}, "k must be a whole number"),
+        ({"k": "many"}, "k must be a number"),
+        ({"k": True}, "k must be a number"),
+        ({"beta": -0.1}, "beta must be at least 0"),
+        ({"beta": (0.1, float("nan"))}, "beta must be finite"),
+        ({"discard_above": 1.1}, "discard_above must be between 0 and 1"),
+        ({"attach_below": 0.7}, "attach_below must not exceed discard_above"),
+        ({"max_order_error": -1}, "max_order_error must be between 0 and 1"),
+        ({"blend": 2}, "blend must be between 0 and 1"),
+        ({"alpha": 0}, "alpha must be greater than 0 and at most 1"),
+        ({"alpha": 1.5}, "alpha must be greater than 0 and at most 1"),
+        ({"alpha": 0.4, "alpha_min": 0.5}, "alpha_min must not exceed alpha"),
+        ({"alpha": 0.4, "depth": 3}, "exclude each other"),
+        ({"depth": 0}, "depth must be greater than 0"),
+        ({"depth": float("inf")}, "depth must be finite"),
+        ({"smooth_points": 1}, "smooth_points must be True or False"),
+        ({"seed": -1}, "seed must be between 0"),
+    ],
+)
+def test_wrong_parameters_are_named(values, words):
+    with pytest.raises(ParameterError, match=words):
+        ReliefParams(**values)
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"front": "w"}, "front must be x, -x"),
+        ({"front": "--x"}, "front must be x, -x"),
+        ({"front": (0, 0, 0)}, "front must not be the zero vector"),
+        ({"front": (0, 1)}, "front must be three numbers"),
+        ({"front": "y"}, "up must not be parallel to front"),
+        ({"up": (0, float("nan"), 1)}, "up must be finite"),
+        ({"viewpoint": (1, 2)}, "viewpoint must be three numbers"),
+        ({"vanishing_point": (0, 0, 5)}, "behind the relief plane"),
+    ],
+)
+def test_wrong_views_are_named(values, words):
+    with pytest.raises(ParameterError, match=words):
+        View(**values)
+
+
+def test_directions_by_letter():
+    view = View(front="-y", up="+z")
+    assert view.front == (0.0, -1.0, 0.0)
+    assert view.up == (0.0, 0.0, 1.0)
+
+
+def test_numpy_values_are_taken_as_plain_numbers():
+    params = ReliefParams(k=np.int64(7), beta=np.array([0.1, 0.3]))
+    assert params.k == 7
+    assert isinstance(params.k, int)
+    assert params.beta == (0.1, 0.3)
+
+
+def test_parameters_cannot_be_changed():
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        ReliefParams().k = 3
