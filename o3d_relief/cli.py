@@ -165,6 +165,8 @@ def _add_params(command: argparse.ArgumentParser) -> None:
             help=f"{text} (default: %(default)s)")  # fmt: skip
     add("--no-smooth-points", dest="smooth_points", action="store_false",
         help="the paper's own restoration, without smoothing around the points")  # fmt: skip
+    add("--no-in-front", dest="in_front", action="store_false",
+        help="the paper's own behaviour: visible parts may end behind the plane and are trimmed")  # fmt: skip
     add("--alpha", type=float, metavar="A", help="largest compression ratio (default: no compression)")
     add("--alpha-min", type=float, metavar="A", help="smallest compression ratio (default: half of alpha)")
     add("--depth", type=float, metavar="D", help="exact depth in the input's unit, instead of alpha")

@@ -158,6 +158,9 @@ class ReliefParams:
     smooth_points : bool
         Also restore a disc around every kept attenuation point, which removes the small pimples that
         the paper's own rule (False) leaves there.
+    in_front : bool
+        Restore whatever is visible and behind the relief plane, too, so that every visible vertex ends in
+        front of it. False: the paper's own behaviour, which trims it.
     seed : int
         Seed of the clustering.
 
@@ -182,6 +185,7 @@ class ReliefParams:
     alpha_min: float | None = None
     depth: float | None = None
     smooth_points: bool = True
+    in_front: bool = True
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -195,8 +199,9 @@ class ReliefParams:
                 "attach_below must not exceed discard_above. "
                 f"Got {self.attach_below:g} and {self.discard_above:g} instead."
             )
-        if not isinstance(self.smooth_points, bool):
-            raise ParameterError(f"smooth_points must be True or False. Got {self.smooth_points!r} instead.")
+        for name in ("smooth_points", "in_front"):
+            if not isinstance(getattr(self, name), bool):
+                raise ParameterError(f"{name} must be True or False. Got {getattr(self, name)!r} instead.")
         set_field(self, "seed", _check_integer("seed", self.seed, 0, 2**32 - 1))
         self._check_compression()
 

@@ -43,7 +43,13 @@ from o3d_relief.stages.clustering import cluster_vertices
 from o3d_relief.stages.compression import alpha_for_depth, compress
 from o3d_relief.stages.construction import construct
 from o3d_relief.stages.perspective import forced_perspective
-from o3d_relief.stages.restoration import cluster_radii, order_errors, restore, smoothing_discs
+from o3d_relief.stages.restoration import (
+    cluster_radii,
+    lifting_discs,
+    order_errors,
+    restore,
+    smoothing_discs,
+)
 from o3d_relief.stages.trim import Trimmed, trim_behind
 from o3d_relief.stages.visibility import visible_vertices
 
@@ -361,7 +367,10 @@ def _restoration(
     counts = {"high_errors": int(high.sum())}
     if params.smooth_points:
         high |= smoothing_discs(vertices, index, radii)
-    restored = restore(vertices, laplacian, z, high, index, visible, blend=params.blend)
+    if params.in_front:
+        high |= lifting_discs(vertices, z, visible)
+    bounded = visible if params.in_front else None
+    restored = restore(vertices, laplacian, z, high, index, blend=params.blend, in_front=bounded)
     counts |= {
         "solved": int(restored.solved.sum()),
         "points_held": restored.points_held,
@@ -398,6 +407,6 @@ def _trim(
     usable = scene.welded_index >= 0
     welded = scene.welded_index[usable]
     moved = to_relief_units(in_vertices, frame)
-    moved[usable] += np.column_stack([vertices[:, :2], z])[welded] - scene.vertices[welded]
-    moved[np.abs(moved[:, 2]) < _ON_PLANE, 2] = 0.0
+    moved[usable, :2] += (vertices - scene.vertices)[welded, :2]
+    moved[usable, 2] = np.where(np.abs(z) < _ON_PLANE, 0.0, z)[welded]
     return trim_behind(moved * frame.unit, in_faces, usable)

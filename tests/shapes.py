@@ -49,7 +49,7 @@ def bust(resolution: int = 40) -> Shape:
     vertices, faces = sphere(resolution)
     x, y, z = (vertices / 50.0).T
     bumps = 1 + 0.12 * np.sin(5 * x + 1) * np.cos(6 * y) + 0.08 * np.sin(9 * z + 2 * y)
-    nose = 0.9 * np.exp(-((x - 0.1) ** 2 + (y + 0.1) ** 2) / 0.05) * (z > 0)
+    nose = 0.4 * np.exp(-((x - 0.1) ** 2 + (y + 0.1) ** 2) / 0.05) * (z > 0)
     vertices = vertices * (bumps + nose)[:, None]
     vertices[:, 1] += 12 * np.exp(-((x - 0.1) ** 2 + (y + 0.1) ** 2) / 0.08) * (z > 0)
     return vertices, faces

@@ -26,6 +26,7 @@ from o3d_relief import ParameterError, ReliefParams, View
         ({"depth": 0}, "depth must be greater than 0"),
         ({"depth": float("inf")}, "depth must be finite"),
         ({"smooth_points": 1}, "smooth_points must be True or False"),
+        ({"in_front": None}, "in_front must be True or False"),
         ({"seed": -1}, "seed must be between 0"),
     ],
 )

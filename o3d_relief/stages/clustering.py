@@ -56,9 +56,13 @@ def cluster_vertices(
 
 
 def _samples(xy: NDArray[np.float64], k: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return what stands for the vertices in the k-means: (s, 2) positions and (s,) weights."""
+    """Return what stands for the vertices in the k-means: (s, 2) positions and (s,) weights.
+
+    In an order of their own, so that the seeding does not depend on how the vertices are numbered.
+    """
+    in_order = xy[np.lexsort(xy.T)]
     if len(xy) <= _CELLS**2:
-        return xy, np.ones(len(xy))
+        return in_order, np.ones(len(xy))
     low = xy.min(axis=0)
     step = float((xy.max(axis=0) - low).max()) / _CELLS
     cell = np.minimum((xy - low) // step, _CELLS - 1).astype(np.int64) @ np.array([1, _CELLS])
@@ -66,5 +70,5 @@ def _samples(xy: NDArray[np.float64], k: int) -> tuple[NDArray[np.float64], NDAr
     sums = np.stack([np.bincount(cell, weights=c, minlength=_CELLS**2) for c in xy.T], axis=1)
     full = weights > 0
     if full.sum() < _SAMPLES_PER_CLUSTER * k:
-        return xy, np.ones(len(xy))
+        return in_order, np.ones(len(xy))
     return sums[full] / weights[full, None], weights[full]

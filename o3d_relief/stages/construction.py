@@ -68,7 +68,7 @@ def construct(
     Raises
     ------
     SolverError
-        The linear system could not be solved to 1e-10.
+        The linear system could not be solved.
     """
     z = vertices[:, 2]
     components, label = connected_components(laplacian, directed=False)

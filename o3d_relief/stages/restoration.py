@@ -13,7 +13,15 @@ from scipy.spatial.distance import pdist
 
 from o3d_relief.linalg.solve import solve_spd
 
-__all__ = ["Restoration", "cluster_radii", "depth_order_error", "order_errors", "restore", "smoothing_discs"]
+__all__ = [
+    "Restoration",
+    "cluster_radii",
+    "depth_order_error",
+    "lifting_discs",
+    "order_errors",
+    "restore",
+    "smoothing_discs",
+]
 
 _SAME_HEIGHT = 1e-6
 """Heights closer than this, in relief units, have no order."""
@@ -22,6 +30,11 @@ _DISC = 0.3
 """Radius of the disc around a point that is smoothed, in cluster radii."""
 
 _DIRECTIONS = 64
+
+_LIFT = 3.0
+"""Radius of the disc around a vertex that is lifted, in its distance to S."""
+
+_ROUNDS = 30
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -177,15 +190,43 @@ def smoothing_discs(
     return marked
 
 
+def lifting_discs(
+    vertices: NDArray[np.float64], z: NDArray[np.float64], visible: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Mark the surroundings of what is visible and lies behind S.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+        Original positions.
+    z : (n,) float64
+        Heights after the construction.
+    visible : (n,) bool
+
+    Returns
+    -------
+    (n,) bool
+        All vertices within three times its distance to S of a visible vertex behind S: wide enough to lift
+        it without a step, narrow enough to leave the rest alone.
+    """
+    marked = np.zeros(len(vertices), dtype=bool)
+    behind = np.flatnonzero(visible & (z < 0.0))
+    if len(behind):
+        for around in cKDTree(vertices).query_ball_point(vertices[behind], _LIFT * -z[behind]):
+            marked[around] = True
+        marked[behind] = True
+    return marked
+
+
 def restore(
     vertices: NDArray[np.float64],
     laplacian: sp.csr_array,
     z: NDArray[np.float64],
     high: NDArray[np.bool_],
     index: NDArray[np.int64],
-    visible: NDArray[np.bool_],
     *,
     blend: float = 0.9,
+    in_front: NDArray[np.bool_] | None = None,
 ) -> Restoration:
     """Solve the vertices with high errors again, Appendix VI.
 
@@ -195,9 +236,9 @@ def restore(
     slivers. Multiplied by D the operator is the symmetric t C + (1 - t) C D^-1 C, and as in the
     construction it is solved for the displacement.
 
-    The fixed points held the surface in front of S; set free, some of it would sink behind. What is
-    visible and in front must stay there: where it does not, the lowest vertices are set onto S and the
-    rest is solved again, until none is behind.
+    The fixed points held the surface in front of S; set free, some of it would sink behind. Where
+    `in_front` is given the system is therefore solved as the minimum of its quadratic form subject to
+    z'' >= 0 there (an obstacle problem), by a primal-dual active set.
 
     Parameters
     ----------
@@ -211,9 +252,10 @@ def restore(
         The vertices to solve again.
     index : (q,) int64
         The fixed points; they stay fixed in a component of which every vertex is high.
-    visible : (n,) bool
     blend : float
         t in [0, 1], the share of first order differentials.
+    in_front : (n,) bool, optional
+        Vertices that must not end behind S, if they are solved again; none where omitted.
 
     Returns
     -------
@@ -222,7 +264,7 @@ def restore(
     Raises
     ------
     SolverError
-        The linear system could not be solved to 1e-10.
+        The linear system could not be solved to its tolerance.
     """
     components, label = connected_components(laplacian, directed=False)
     whole = np.bincount(label, weights=~high, minlength=components) == 0
@@ -233,18 +275,49 @@ def restore(
     anchored = np.bincount(label, weights=~solved, minlength=components) > 0
     solved &= anchored[label]
 
-    in_front = visible & (z >= 0.0)
-    on_plane = np.zeros(len(z), dtype=bool)
-    result = z
+    bounded = np.zeros(len(z), dtype=bool) if in_front is None else in_front
+    result = z.copy()
+    if in_front is not None:
+        _lift_loose(result, label, ~anchored, in_front)
     system = _System(laplacian, np.flatnonzero(solved), blend)
-    while True:
-        fixed = np.where(on_plane, 0.0, z) - vertices[:, 2]
-        result = system.solve(vertices[:, 2], fixed, on_plane)
-        behind = in_front & ~on_plane & (result < -_SAME_HEIGHT)
-        if not behind.any():
-            break
-        on_plane |= _lowest(laplacian, result, behind)
+    result, on_plane = _in_front(system, vertices[:, 2], result, bounded & solved)
     return Restoration(z=result, solved=solved, points_held=len(held), set_on_plane=int(on_plane.sum()))
+
+
+def _lift_loose(
+    z: NDArray[np.float64],
+    label: NDArray[np.int32],
+    loose: NDArray[np.bool_],
+    in_front: NDArray[np.bool_],
+) -> None:
+    """Lift each loose component, in place and as a whole, until none of `in_front` is behind S."""
+    lift = np.zeros(len(loose))
+    concerned = np.flatnonzero(in_front & loose[label])
+    np.maximum.at(lift, label[concerned], -z[concerned])
+    z += lift[label]
+
+
+def _in_front(
+    system: _System, original: NDArray[np.float64], z: NDArray[np.float64], bounded: NDArray[np.bool_]
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Solve subject to z >= 0 on `bounded`; return the heights and the vertices that lie on the bound."""
+    on_plane = np.zeros(len(z), dtype=bool)
+    rounds = 0
+    while True:
+        result, force = system.solve(original, np.where(on_plane, 0.0, z), on_plane)
+        behind = bounded & ~on_plane & (result < -_SAME_HEIGHT)
+        # A vertex that is pulled towards S, not held off it, is let go.
+        released = on_plane & (force < 0.0)
+        if not behind.any() and not released.any():
+            break
+        rounds += 1
+        if rounds > _ROUNDS:
+            # The active set goes round in a circle: from here on it only grows, and so comes to an end.
+            released[:] = False
+            if not behind.any():
+                break
+        on_plane = (on_plane & ~released) | behind
+    return np.where(bounded, np.maximum(result, 0.0), result), on_plane
 
 
 class _System:
@@ -260,30 +333,28 @@ class _System:
         self._operator = (blend * first + (1.0 - blend) * second).tocsr()
 
     def solve(
-        self, original: NDArray[np.float64], displacement: NDArray[np.float64], held: NDArray[np.bool_]
-    ) -> NDArray[np.float64]:
-        """Return the new heights; `displacement` counts where a vertex is no row, or held."""
+        self, original: NDArray[np.float64], z: NDArray[np.float64], held: NDArray[np.bool_]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Solve for the rows that are not held; `z` counts everywhere else.
+
+        Returns
+        -------
+        z : (n,) float64
+        force : (n,) float64
+            What pushes each held row towards the viewer; 0 elsewhere.
+        """
         moving = ~held[self._rows]
         columns = self._rows[moving]
-        outside = displacement.copy()
-        outside[columns] = 0.0
+        displacement = z - original
+        displacement[columns] = 0.0
         operator = self._operator[moving]
-        outside[columns] = solve_spd(
+        displacement[columns] = solve_spd(
             operator[:, columns].tocsr(),
-            -(operator @ outside),
+            -(operator @ displacement),
             similar=self._first[moving][:, columns].tocsr(),
         )
-        return np.asarray(original + outside)
-
-
-def _lowest(
-    laplacian: sp.csr_array, z: NDArray[np.float64], candidates: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
-    """Mark the candidates that no neighbouring candidate undercuts."""
-    among = laplacian[np.flatnonzero(candidates)][:, np.flatnonzero(candidates)].tocoo()
-    heights = z[candidates]
-    undercut = np.zeros(len(heights), dtype=bool)
-    undercut[among.row[heights[among.col] < heights[among.row]]] = True
-    marked = np.zeros(len(z), dtype=bool)
-    marked[np.flatnonzero(candidates)[~undercut]] = True
-    return marked
+        force = np.zeros(len(z))
+        force[self._rows[~moving]] = self._operator[~moving] @ displacement
+        result = z.copy()
+        result[columns] = original[columns] + displacement[columns]
+        return result, force

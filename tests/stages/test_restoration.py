@@ -8,11 +8,12 @@ from o3d_relief.stages.construction import construct
 from o3d_relief.stages.restoration import (
     cluster_radii,
     depth_order_error,
+    lifting_discs,
     order_errors,
     restore,
     smoothing_discs,
 )
-from shapes import hills, joined, moved
+from shapes import grid, hills, joined, moved
 
 INDEX = np.array([60, 220])
 
@@ -60,43 +61,85 @@ def test_errors_agree_with_the_literal_equation():
 @pytest.mark.parametrize("blend", [0.0, 0.5, 0.9, 1.0])
 def test_agrees_with_the_literal_appendix(blend):
     shape, laplacian, z, high = _bent()
-    nothing_visible = np.zeros(len(z), dtype=bool)
-    found = restore(shape[0], laplacian, z, high, INDEX, nothing_visible, blend=blend)
+    found = restore(shape[0], laplacian, z, high, INDEX, blend=blend)
     assert np.array_equal(found.solved, high)
     assert found.z == pytest.approx(oracle.restore(shape, z, high, blend), abs=1e-6)
 
 
 def test_only_high_vertices_move():
     shape, laplacian, z, high = _bent()
-    found = restore(shape[0], laplacian, z, high, INDEX, np.zeros(len(z), dtype=bool))
+    found = restore(shape[0], laplacian, z, high, INDEX)
     assert np.array_equal(found.z[~high], z[~high])
     assert (found.z[INDEX] != z[INDEX]).all()
 
 
 def test_spike_is_removed():
     shape, laplacian, z, high = _bent()
-    found = restore(shape[0], laplacian, z, high, INDEX, np.zeros(len(z), dtype=bool))
+    found = restore(shape[0], laplacian, z, high, INDEX)
     assert (
         np.abs(laplacian @ (found.z - shape[0][:, 2])).max()
         < 0.3 * np.abs(laplacian @ (z - shape[0][:, 2])).max()
     )
 
 
-def test_nothing_visible_sinks_behind_the_plane():
-    shape, laplacian, z, _ = _bent()
-    z = z - z[INDEX[1]]  # the lowest point, pulled down, is attached to the plane
-    high = smoothing_discs(shape[0], INDEX[:1], np.array([60.0]))
-    pulled = z.copy()
-    pulled[high] += 1.0
-    visible = np.ones(len(z), dtype=bool)
-    lowered = pulled - pulled[high].min()
-    found = restore(shape[0], laplacian, lowered, high, INDEX, visible)
-    assert not ((found.z < -1e-6) & (lowered >= 0)).any()
+def _sunk():
+    """A flat floor 1 unit above S with a smooth hollow that reaches 2 units behind it."""
+    vertices, faces = grid(41)
+    laplacian, _ = cotangent_laplacian(vertices, faces)
+    z = 1.0 - 3.0 * np.exp(-(vertices[:, 0] ** 2 + vertices[:, 1] ** 2) / 200.0)
+    return vertices, laplacian, z
+
+
+def test_everything_visible_behind_is_marked_with_its_surroundings():
+    vertices, _, z = _sunk()
+    visible = vertices[:, 0] > 0
+    marked = lifting_discs(vertices, z, visible)
+    behind = visible & (z < 0)
+    assert marked[behind].all()
+    reach = 3 * -z[behind]
+    distance = np.linalg.norm(vertices[:, None] - vertices[behind], axis=2)
+    assert np.array_equal(marked, (distance <= reach).any(axis=1) | behind)
+    assert not lifting_discs(vertices, np.abs(z), visible).any()
+
+
+def test_nothing_visible_ends_behind_the_plane():
+    vertices, laplacian, z = _sunk()
+    everywhere = np.ones(len(z), dtype=bool)
+    high = lifting_discs(vertices, z, everywhere)
+    found = restore(vertices, laplacian, z, high, np.array([0]), in_front=everywhere)
+    assert (found.z >= 0).all()
+    assert np.array_equal(found.z[~high], z[~high])
+
+
+def test_plane_holds_the_surface_off_and_never_pulls_it():
+    vertices, laplacian, z = _sunk()
+    everywhere = np.ones(len(z), dtype=bool)
+    high = np.linalg.norm(vertices[:, :2], axis=1) < 40
+    found = restore(vertices, laplacian, z - 0.9, high, np.array([0]), in_front=everywhere, blend=1.0)
+    force = (laplacian @ (found.z - vertices[:, 2]))[high]
+    on_plane = found.z[high] == 0
+    assert (force[on_plane] > -1e-9).all()
+    assert np.abs(force[~on_plane]).max() < 1e-8
+
+
+def test_loose_component_is_lifted_as_a_whole():
+    floor, _ = grid(21)
+    part = moved(hills(5), (300, 0, 0))
+    shape = joined(grid(21), part)
+    laplacian, _ = cotangent_laplacian(*shape)
+    z = shape[0][:, 2].copy()
+    z[len(floor) :] += -50 - z[len(floor) :].min()
+    everywhere = np.ones(len(z), dtype=bool)
+    high = z < 0
+    found = restore(shape[0], laplacian, z, high, np.array([0]), in_front=everywhere)
+    lift = found.z - z
+    assert lift[len(floor) :] == pytest.approx(50.0)
+    assert not lift[: len(floor)].any()
 
 
 def test_no_high_vertices_change_nothing():
     shape, laplacian, z, high = _bent()
-    found = restore(shape[0], laplacian, z, np.zeros_like(high), INDEX, np.zeros_like(high))
+    found = restore(shape[0], laplacian, z, np.zeros_like(high), INDEX)
     assert np.array_equal(found.z, z)
 
 
@@ -107,7 +150,7 @@ def test_wholly_high_component_is_held_by_its_points():
     index = np.array([12])
     z = construct(shape[0], laplacian, index, np.array([1.0])).z
     high = np.ones(50, dtype=bool)
-    found = restore(shape[0], laplacian, z, high, index, np.zeros(50, dtype=bool))
+    found = restore(shape[0], laplacian, z, high, index)
     assert found.points_held == 1
     assert found.z[12] == 1.0
     assert np.array_equal(found.z[25:], z[25:])

@@ -1,0 +1,179 @@
+import json
+import subprocess
+import sys
+import time
+
+import numpy as np
+import open3d as o3d
+import pytest
+
+from o3d_relief.cli import main
+from o3d_relief.scene.read import read_mesh
+from shapes import bust, hills, to_mesh
+
+
+@pytest.fixture
+def scene(tmp_path):
+    path = tmp_path / "scene.ply"
+    o3d.io.write_triangle_mesh(str(path), to_mesh(bust(30)))
+    return path
+
+
+def _fails(capsys, *arguments):
+    """Run the command, which must fail with one sentence; return it."""
+    assert main([str(item) for item in arguments]) == 2
+    error = capsys.readouterr().err
+    sentence = error.strip().splitlines()[-1]
+    assert sentence.startswith("o3d-relief: error: ")
+    assert "Traceback" not in error
+    return sentence
+
+
+def _files(folder):
+    return sorted(str(p.relative_to(folder)) for p in folder.rglob("*"))
+
+
+@pytest.mark.parametrize("ending", ["ply", "obj", "stl", "glb"])
+def test_make_writes_a_relief(tmp_path, scene, ending, capsys):
+    out = tmp_path / f"relief.{ending}"
+    assert main(["make", str(scene), str(out), "-k", "16"]) == 0
+    relief = read_mesh(out)
+    assert np.asarray(relief.vertices)[:, 2].min() == pytest.approx(0.0, abs=1e-6)
+    told = capsys.readouterr().err
+    for stage in ("scene", "visibility", "clusters", "attenuation", "construction", "trim"):
+        assert f"  {stage}" in told
+
+
+def test_report_says_what_happened(tmp_path, scene):
+    report = tmp_path / "report.json"
+    out = tmp_path / "relief.ply"
+    words = ["make", str(scene), str(out), "-k", "16", "--beta", "0.3", "--depth", "20", "--report", str(report)]
+    assert main(words) == 0
+    values = json.loads(report.read_text())
+    assert values["params"]["k"] == 16
+    assert values["params"]["beta"] == 0.3
+    assert values["relief_depth"] == pytest.approx(20.0)
+    assert np.asarray(read_mesh(out).vertices)[:, 2].max() == pytest.approx(20.0)
+    assert 0 <= values["visible_behind_share"] < 0.1
+    assert values["scene_depth"] > values["relief_depth"]
+    assert values["stages"]["clusters"]["counts"]["clusters"] == 16
+    assert values["stages"]["construction"]["seconds"] > 0
+
+
+@pytest.mark.parametrize("front", [["--front", "-y"], ["--front", "0", "-1", "0"], ["--front=0,-1,0"], ["--front", "-0,-1,0"]])
+def test_directions_in_every_spelling(tmp_path, scene, front):
+    report = tmp_path / "report.json"
+    words = ["make", str(scene), str(tmp_path / "r.ply"), "-k", "4", *front, "--up", "z", "--report", str(report)]
+    assert main(words) == 0
+    assert json.loads(report.read_text())["view"]["front"] == [0, -1, 0]
+
+
+def test_every_option_reaches_the_relief(tmp_path, scene):
+    report = tmp_path / "report.json"
+    options = {
+        "-k": "8", "--beta": "0.1,0.2,0.3,0.4,0.5,0.6,0.7,0.8", "--discard-above": "0.9", "--attach-below": "0.1",
+        "--max-order-error": "0.4", "--blend": "0.5", "--alpha": "0.7", "--alpha-min": "0.2", "--seed": "3",
+    }  # fmt: skip
+    words = [word for pair in options.items() for word in pair]
+    points = ["--viewpoint", "0", "0", "900", "--vanishing-point", "0", "0", "-400"]
+    assert main(["make", str(scene), str(tmp_path / "r.ply"), *words, *points, "--no-smooth-points", "--no-in-front",
+                 "--report", str(report)]) == 0  # fmt: skip
+    values = json.loads(report.read_text())
+    assert values["params"] == {
+        "k": 8, "beta": [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8], "discard_above": 0.9, "attach_below": 0.1,
+        "max_order_error": 0.4, "blend": 0.5, "alpha": 0.7, "alpha_min": 0.2, "depth": None,
+        "smooth_points": False, "in_front": False, "seed": 3,
+    }  # fmt: skip
+    assert values["view"]["viewpoint"] == [0, 0, 900]
+    assert values["view"]["vanishing_point"] == [0, 0, -400]
+
+
+def test_stage_pictures(tmp_path, scene):
+    folder = tmp_path / "deep" / "pictures"
+    assert main(["make", str(scene), str(tmp_path / "r.ply"), "-k", "16", "--stages", str(folder)]) == 0
+    names = [p.name for p in sorted(folder.iterdir())]
+    assert names[0] == "01_scene.png"
+    assert names[-1] == "09_trim.png"
+    assert len(names) == 9
+
+
+def test_missing_input(tmp_path, capsys):
+    assert "nothing.ply does not exist" in _fails(capsys, "make", tmp_path / "nothing.ply", tmp_path / "r.ply")
+
+
+def test_input_that_is_no_mesh(tmp_path, capsys):
+    path = tmp_path / "letter.ply"
+    path.write_text("Dear sculptor,\n")
+    assert "letter.ply" in _fails(capsys, "make", path, tmp_path / "r.ply")
+    assert _files(tmp_path) == ["letter.ply"]
+
+
+def test_input_without_triangles(tmp_path, capsys):
+    path = tmp_path / "cloud.ply"
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(hills(5)[0]))
+    o3d.io.write_point_cloud(str(path), cloud)
+    assert "no triangles" in _fails(capsys, "make", path, tmp_path / "r.ply")
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["-k", "0"], "k must be between 1 and"),
+        (["-k", "999999"], "k must be at most the number of vertices"),
+        (["--alpha", "0.5", "--depth", "3"], "exclude each other"),
+        (["--front", "y"], "parallel"),
+        (["--viewpoint", "0,0,3"], "in front of the scene"),
+        (["--vanishing-point", "0,0,3"], "behind the relief plane"),
+        (["--report", "missing/r.json"], "folder missing is missing"),
+    ],
+)
+def test_wrong_options_write_nothing(tmp_path, scene, capsys, words, sentence):
+    assert sentence in _fails(capsys, "make", scene, tmp_path / "r.ply", *words)
+    assert _files(tmp_path) == ["scene.ply"]
+
+
+@pytest.mark.parametrize(
+    ("output", "sentence"),
+    [("relief.step", "its ending must be one of"), ("missing/relief.ply", "is missing"), (".", "is a folder")],
+)
+def test_wrong_outputs(tmp_path, scene, capsys, output, sentence):
+    assert sentence in _fails(capsys, "make", scene, tmp_path / output)
+    assert _files(tmp_path) == ["scene.ply"]
+
+
+@pytest.mark.parametrize("words", [[], ["carve"], ["make"], ["make", "a.ply", "b.ply", "--front", "w"],
+                                   ["make", "a.ply", "b.ply", "--beta", "high"],
+                                   ["make", "a.ply", "b.ply", "--viewpoint", "1,2"]])  # fmt: skip
+def test_words_it_does_not_know_end_with_2(words, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(words)
+    assert stop.value.code == 2
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def test_interrupted(tmp_path, scene, capsys, monkeypatch):
+    def interrupt(*_args, **_options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("o3d_relief.pipeline.make_relief", interrupt)
+    assert main(["make", str(scene), str(tmp_path / "r.ply")]) == 130
+    assert "interrupted" in capsys.readouterr().err
+    assert _files(tmp_path) == ["scene.ply"]
+
+
+def test_help_is_instant_and_does_not_load_open3d():
+    code = "import sys; from o3d_relief.cli import main\ntry: main(['make', '--help'])\nexcept SystemExit: pass\n"
+    code += "assert 'open3d' not in sys.modules and 'scipy' not in sys.modules"
+    started = time.perf_counter()
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "--vanishing-point" in done.stdout
+    assert time.perf_counter() - started < 5
+
+
+@pytest.mark.slow
+def test_demo(tmp_path):
+    assert main(["demo", str(tmp_path / "demo")]) == 0
+    names = _files(tmp_path / "demo")
+    assert {"sheet.png", "relief.ply", "relief.glb", "scene.ply", "report.json"} <= set(names)
+    assert sum(name.startswith("stages/") for name in names) == 9

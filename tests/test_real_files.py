@@ -1,0 +1,93 @@
+"""The pipeline on real meshes: unwelded, non-manifold, slivered, of many parts."""
+
+import csv
+
+import numpy as np
+import pytest
+
+import o3d_relief as rel
+
+pytestmark = [pytest.mark.data, pytest.mark.slow]
+
+MESHES = [
+    "broken_chair.obj",
+    "bunny_zipper.ply",
+    "bust_igea.ply",
+    "dragon_full_871k.ply",
+    "dragon_res2.ply",
+    "gargoyle_vertexcolor.ply",
+    "igea_tristrips_original.ply",
+    "lucy_100k.ply",
+    "robot_steampunk_textured.glb",
+    "scene_japanese_temple.obj",
+    "scene_macross_city.glb",
+    "statue_penelope.ply",
+]
+
+
+@pytest.fixture(scope="module")
+def reliefs(data_folder):
+    """Make each relief once, when it is first asked for."""
+    with (data_folder / "MANIFEST.tsv").open() as file:
+        rows = {row["file"]: row for row in csv.DictReader(file, delimiter="\t")}
+    done = {}
+
+    def get(name):
+        if name not in done:
+            side, up = rows[name]["suggested_view_from"].split()[0], rows[name]["up"]
+            front = {"z+": "z", "y+": "y", "y-": "-y"}[side]
+            done[name] = rel.make_relief(
+                rel.read_mesh(data_folder / name), rel.ReliefParams(k=128), view=rel.View(front=front, up=up)
+            )
+        return done[name]
+
+    return get
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_every_mesh_gives_a_relief(reliefs, name):
+    relief = reliefs(name)
+    z = np.asarray(relief.mesh.vertices)[:, 2]
+    unit = relief.stages["scene"].unit
+    assert np.isfinite(np.asarray(relief.mesh.vertices)).all()
+    assert z.min() == 0.0
+    scene = relief.stages["scene"].vertices
+    assert z.max() / unit <= scene[:, 2].max() * 1.01
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_construction_keeps_the_differentials(reliefs, name):
+    s = reliefs(name).stages
+    vertices, points, z = s["perspective"].vertices, s["attenuation"], s["construction"].z
+    assert np.array_equal(z[points.kept_index], points.kept_height)
+    laplacian, _ = rel.cotangent_laplacian(vertices, s["scene"].faces)
+    change = laplacian @ z - laplacian @ vertices[:, 2]
+    change[points.kept_index] = 0.0
+    assert np.linalg.norm(change) <= 1e-8 * np.linalg.norm(laplacian @ vertices[:, 2])
+
+
+def test_full_dragon_stays_in_its_box(reliefs):
+    s = reliefs("dragon_full_871k.ply").stages
+    depth = np.ptp(s["scene"].vertices[:, 2])
+    for name in ("construction", "restoration", "compression"):
+        assert s[name].z.max() <= s["scene"].vertices[:, 2].max() + 0.01 * depth
+        assert np.abs(s[name].z - s["scene"].vertices[:, 2]).max() <= 1.01 * depth
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_nothing_visible_lies_behind(reliefs, name):
+    assert reliefs(name).report()["visible_behind_share"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "attribute"),
+    [
+        ("gargoyle_vertexcolor.ply", "vertex_colors"),
+        ("robot_steampunk_textured.glb", "triangle_uvs"),
+        ("robot_steampunk_textured.glb", "textures"),
+        ("scene_macross_city.glb", "vertex_colors"),
+        ("scene_japanese_temple.obj", "triangle_uvs"),
+    ],
+)
+def test_attributes_survive(reliefs, name, attribute):
+    assert getattr(reliefs(name).mesh, f"has_{attribute}")()
