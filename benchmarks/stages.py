@@ -28,10 +28,14 @@ def main() -> None:
         started = time.perf_counter()
         runs.append(rel.make_relief(mesh, params).stages)
         totals.append(time.perf_counter() - started)
-    print(f"{options.mesh or 'built-in scene'}: {len(mesh.vertices)} vertices, {len(mesh.triangles)} triangles")
+    print(
+        f"{options.mesh or 'built-in scene'}: {len(mesh.vertices)} vertices, {len(mesh.triangles)} triangles"
+    )
     for name in runs[0]:
         print(f"{name:<13}{statistics.median(run[name].seconds for run in runs):8.3f} s")
-    print(f"{'total':<13}{statistics.median(totals):8.3f} s  (worst of {options.repeat}: {max(totals):.3f} s)")
+    print(
+        f"{'total':<13}{statistics.median(totals):8.3f} s  (worst of {options.repeat}: {max(totals):.3f} s)"
+    )
 
 
 if __name__ == "__main__":

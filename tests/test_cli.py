@@ -47,7 +47,19 @@ def test_make_writes_a_relief(tmp_path, scene, ending, capsys):
 def test_report_says_what_happened(tmp_path, scene):
     report = tmp_path / "report.json"
     out = tmp_path / "relief.ply"
-    words = ["make", str(scene), str(out), "-k", "16", "--beta", "0.3", "--depth", "20", "--report", str(report)]
+    words = [
+        "make",
+        str(scene),
+        str(out),
+        "-k",
+        "16",
+        "--beta",
+        "0.3",
+        "--depth",
+        "20",
+        "--report",
+        str(report),
+    ]
     assert main(words) == 0
     values = json.loads(report.read_text())
     assert values["params"]["k"] == 16
@@ -60,10 +72,23 @@ def test_report_says_what_happened(tmp_path, scene):
     assert values["stages"]["construction"]["seconds"] > 0
 
 
-@pytest.mark.parametrize("front", [["--front", "-y"], ["--front", "0", "-1", "0"], ["--front=0,-1,0"], ["--front", "-0,-1,0"]])
+@pytest.mark.parametrize(
+    "front", [["--front", "-y"], ["--front", "0", "-1", "0"], ["--front=0,-1,0"], ["--front", "-0,-1,0"]]
+)
 def test_directions_in_every_spelling(tmp_path, scene, front):
     report = tmp_path / "report.json"
-    words = ["make", str(scene), str(tmp_path / "r.ply"), "-k", "4", *front, "--up", "z", "--report", str(report)]
+    words = [
+        "make",
+        str(scene),
+        str(tmp_path / "r.ply"),
+        "-k",
+        "4",
+        *front,
+        "--up",
+        "z",
+        "--report",
+        str(report),
+    ]
     assert main(words) == 0
     assert json.loads(report.read_text())["view"]["front"] == [0, -1, 0]
 
@@ -71,13 +96,14 @@ def test_directions_in_every_spelling(tmp_path, scene, front):
 def test_every_option_reaches_the_relief(tmp_path, scene):
     report = tmp_path / "report.json"
     options = {
-        "-k": "8", "--beta": "0.1,0.2,0.3,0.4,0.5,0.6,0.7,0.8", "--discard-above": "0.9", "--attach-below": "0.1",
+        "-k": "8", "--beta": "0.1,0.2,0.3,0.4,0.5,0.6,0.7,0.8",
+        "--discard-above": "0.9", "--attach-below": "0.1",
         "--max-order-error": "0.4", "--blend": "0.5", "--alpha": "0.7", "--alpha-min": "0.2", "--seed": "3",
     }  # fmt: skip
     words = [word for pair in options.items() for word in pair]
     points = ["--viewpoint", "0", "0", "900", "--vanishing-point", "0", "0", "-400"]
-    assert main(["make", str(scene), str(tmp_path / "r.ply"), *words, *points, "--no-smooth-points", "--no-in-front",
-                 "--report", str(report)]) == 0  # fmt: skip
+    switches = ["--no-smooth-points", "--no-in-front", "--report", str(report)]
+    assert main(["make", str(scene), str(tmp_path / "r.ply"), *words, *points, *switches]) == 0
     values = json.loads(report.read_text())
     assert values["params"] == {
         "k": 8, "beta": [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8], "discard_above": 0.9, "attach_below": 0.1,
@@ -98,7 +124,9 @@ def test_stage_pictures(tmp_path, scene):
 
 
 def test_missing_input(tmp_path, capsys):
-    assert "nothing.ply does not exist" in _fails(capsys, "make", tmp_path / "nothing.ply", tmp_path / "r.ply")
+    assert "nothing.ply does not exist" in _fails(
+        capsys, "make", tmp_path / "nothing.ply", tmp_path / "r.ply"
+    )
 
 
 def test_input_that_is_no_mesh(tmp_path, capsys):
@@ -134,7 +162,11 @@ def test_wrong_options_write_nothing(tmp_path, scene, capsys, words, sentence):
 
 @pytest.mark.parametrize(
     ("output", "sentence"),
-    [("relief.step", "its ending must be one of"), ("missing/relief.ply", "is missing"), (".", "is a folder")],
+    [
+        ("relief.step", "its ending must be one of"),
+        ("missing/relief.ply", "is missing"),
+        (".", "is a folder"),
+    ],
 )
 def test_wrong_outputs(tmp_path, scene, capsys, output, sentence):
     assert sentence in _fails(capsys, "make", scene, tmp_path / output)
@@ -162,7 +194,8 @@ def test_interrupted(tmp_path, scene, capsys, monkeypatch):
 
 
 def test_help_is_instant_and_does_not_load_open3d():
-    code = "import sys; from o3d_relief.cli import main\ntry: main(['make', '--help'])\nexcept SystemExit: pass\n"
+    code = "import sys; from o3d_relief.cli import main\n"
+    code += "try: main(['make', '--help'])\nexcept SystemExit: pass\n"
     code += "assert 'open3d' not in sys.modules and 'scipy' not in sys.modules"
     started = time.perf_counter()
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)

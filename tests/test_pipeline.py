@@ -187,7 +187,8 @@ def test_more_points_lower_the_relief(mesh):
 
 def test_larger_beta_lowers_the_relief(mesh):
     depth = [
-        rel.make_relief(mesh, rel.ReliefParams(k=48, beta=b)).report()["relief_depth"] for b in (0.02, 0.2, 2.0)
+        rel.make_relief(mesh, rel.ReliefParams(k=48, beta=b)).report()["relief_depth"]
+        for b in (0.02, 0.2, 2.0)
     ]
     assert depth[0] > depth[1] > depth[2]
 
@@ -236,7 +237,9 @@ def test_vanishing_point_narrows_what_lies_behind(mesh):
     width = np.abs(near.stages["perspective"].vertices[:, :2]) / np.maximum(np.abs(plain[:, :2]), 1e-9)
     back = plain[:, 2] < 20
     assert width[back].max() < 0.8
-    assert near.stages["perspective"].vertices[plain[:, 2].argmax()] == pytest.approx(plain[plain[:, 2].argmax()])
+    assert near.stages["perspective"].vertices[plain[:, 2].argmax()] == pytest.approx(
+        plain[plain[:, 2].argmax()]
+    )
 
 
 def test_view_from_another_side(mesh):
@@ -259,7 +262,9 @@ def test_attributes_survive_the_weld_and_the_cut():
     mesh = to_mesh((vertices, faces))
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     mesh.vertex_colors = o3d.utility.Vector3dVector((vertices - low) / (high - low))
-    mesh.triangle_uvs = o3d.utility.Vector2dVector(((vertices - low) / (high - low))[faces].reshape(-1, 3)[:, :2])
+    mesh.triangle_uvs = o3d.utility.Vector2dVector(
+        ((vertices - low) / (high - low))[faces].reshape(-1, 3)[:, :2]
+    )
     ids = (np.arange(len(faces)) % 2).astype(np.int32)
     mesh.triangle_material_ids = o3d.utility.IntVector(ids)
     pictures = [np.full((2, 2, 3), value, dtype=np.uint8) for value in (10, 200)]
