@@ -1,0 +1,1 @@
+"""What is looked at: pictures without a display."""

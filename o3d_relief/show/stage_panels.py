@@ -1,0 +1,279 @@
+"""The two panels of each stage's picture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from o3d_relief.errors import ParameterError
+from o3d_relief.records import (
+    AttenuationStage,
+    ClustersStage,
+    CompressionStage,
+    ConstructionStage,
+    PerspectiveStage,
+    RestorationStage,
+    SceneStage,
+    StageRecord,
+    TrimStage,
+    VisibilityStage,
+)
+from o3d_relief.show.camera import view_direction
+from o3d_relief.show.colors import label_colors
+from o3d_relief.show.render import render
+
+if TYPE_CHECKING:
+    import open3d as o3d
+
+__all__ = ["PANELS", "Easel"]
+
+Pictures = list[NDArray[np.uint8]]
+Vector = tuple[float, float, float]
+_Record = TypeVar("_Record", bound=StageRecord)
+
+_FRONT: Vector = (0.0, 0.0, 1.0)
+_OBLIQUE = view_direction(38.0, 12.0)
+_NEAR_FRONT = view_direction(22.0, 10.0)
+_SIDE = view_direction(65.0, 8.0)
+_GAP = 4  # pixels
+_SEEN, _HIDDEN = (0.93, 0.78, 0.42), (0.33, 0.45, 0.62)
+_ACTIONS = {"attach": (0.16, 0.47, 0.71), "scale": (0.93, 0.66, 0.16), "discard": (0.78, 0.17, 0.20)}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Easel:
+    """The records of a run, and how large to draw.
+
+    Attributes
+    ----------
+    stages : mapping of str to StageRecord
+    size : (width, height)
+        Of one panel, in pixels.
+    relief : open3d.geometry.TriangleMesh or None
+        The finished relief.
+    """
+
+    stages: Mapping[str, StageRecord]
+    size: tuple[int, int]
+    relief: o3d.geometry.TriangleMesh | None = None
+
+    def record(self, kind: type[_Record]) -> _Record:
+        """Return the record of a stage.
+
+        Raises
+        ------
+        ParameterError
+            There is none.
+        """
+        record = self.stages.get(kind.name)
+        if not isinstance(record, kind):
+            raise ParameterError(f"The stage {kind.name!r} has no record.")
+        return record
+
+    @property
+    def vertices(self) -> NDArray[np.float64]:
+        """The vertices (n, 3) after the forced perspective."""
+        return self.record(PerspectiveStage).vertices
+
+    def raised(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the vertices with other heights (n,)."""
+        return np.column_stack([self.vertices[:, :2], z])
+
+    def mesh(self, vertices: NDArray[np.float64]) -> o3d.geometry.TriangleMesh:
+        """Return the scene's faces over these vertices (n, 3)."""
+        import open3d as o3d
+
+        return o3d.geometry.TriangleMesh(
+            o3d.utility.Vector3dVector(vertices.copy()),  # records are read-only
+            o3d.utility.Vector3iVector(self.record(SceneStage).faces.astype(np.int32)),
+        )
+
+
+def _bounds(*surfaces: NDArray[np.float64]) -> NDArray[np.float64]:
+    low = np.min([vertices.min(axis=0) for vertices in surfaces], axis=0)
+    return np.array([low, np.max([vertices.max(axis=0) for vertices in surfaces], axis=0)])
+
+
+def _close_up(vertices: NDArray[np.float64], worst: int) -> NDArray[np.float64]:
+    """Return a box of 30 relief units around a vertex."""
+    return np.array([vertices[worst] - 15.0, vertices[worst] + 15.0])
+
+
+def _scene(easel: Easel) -> Pictures:
+    record = easel.record(SceneStage)
+    mesh = easel.mesh(record.vertices)
+    title = f"scene: {len(record.vertices)} vertices, {len(record.faces)} faces"
+    return [
+        render(mesh, size=easel.size, title=title),
+        render(mesh, size=easel.size, direction=_OBLIQUE, title="from the side"),
+    ]
+
+
+def _perspective(easel: Easel) -> Pictures:
+    before, after = easel.record(SceneStage).vertices, easel.vertices
+    changed = not np.array_equal(before, after)
+    bounds = _bounds(before, after)
+    titles = ("before the forced perspective", "after" if changed else "after: no vanishing point, unchanged")
+    return [
+        render(easel.mesh(vertices), size=easel.size, direction=_OBLIQUE, bounds=bounds, title=title)
+        for vertices, title in zip((before, after), titles, strict=True)
+    ]
+
+
+def _visibility(easel: Easel) -> Pictures:
+    visible = easel.record(VisibilityStage).visible
+    colors = np.where(visible[:, None], _SEEN, _HIDDEN)
+    count = int(visible.sum())
+    legend = [(_SEEN, f"visible: {count}"), (_HIDDEN, f"hidden: {len(visible) - count}")]
+    mesh = easel.mesh(easel.vertices)
+    return [
+        render(mesh, size=easel.size, colors=colors, sharp_colors=True, title="visibility", legend=legend),
+        render(
+            mesh,
+            size=easel.size,
+            direction=_SIDE,
+            colors=colors,
+            sharp_colors=True,
+            title="from the side",
+            legend=legend,
+        ),
+    ]
+
+
+def _clusters(easel: Easel) -> Pictures:
+    record = easel.record(ClustersStage)
+    colors = label_colors(record.labels, easel.record(SceneStage).faces)[record.labels]
+    mesh = easel.mesh(easel.vertices)
+    points = np.column_stack([record.centers, np.zeros(len(record.centers))])
+    title = f"clusters: {len(record.centers)}, with their centres"
+    front = render(
+        mesh,
+        size=easel.size,
+        colors=colors,
+        sharp_colors=True,
+        points=points,
+        point_colors=(0.97, 0.96, 0.94),
+        point_radius=_dot(easel, len(points)),
+        title=title,
+    )
+    side = render(
+        mesh, size=easel.size, direction=_OBLIQUE, colors=colors, sharp_colors=True, title="from the side"
+    )
+    return [front, side]
+
+
+def _dot(easel: Easel, count: int) -> float:
+    """Return a radius at which so many points stay apart."""
+    return float(np.clip(0.08 * min(easel.size) / np.sqrt(max(count, 1)), 1.2, 0.0075 * min(easel.size)))
+
+
+def _attenuation(easel: Easel) -> Pictures:
+    record = easel.record(AttenuationStage)
+    mesh = easel.mesh(easel.vertices)
+    points = easel.vertices[record.index]
+    colors = np.array([_ACTIONS[str(action)] for action in record.action]).reshape(-1, 3)
+    legend: list[tuple[ArrayLike, str]] = [
+        (color, f"{action}: {int(np.sum(record.action == action))}") for action, color in _ACTIONS.items()
+    ]
+    radius = _dot(easel, len(points))
+    kept = record.action != "discard"
+    top = max(float(record.new_height[kept].max(initial=0.0)), 1e-9)
+    old = float(record.height[kept].max(initial=0.0))
+    actions = render(
+        mesh,
+        size=easel.size,
+        points=points,
+        point_colors=colors,
+        point_radius=radius,
+        title="attenuation points by action",
+        legend=legend,
+    )
+    heights = render(
+        mesh,
+        size=easel.size,
+        points=points[kept],
+        point_field=record.new_height[kept],
+        point_radius=radius,
+        field_range=(0.0, top),
+        field_label="new height",
+        title=f"new heights: up to {top:.1f}, before up to {old:.1f}",
+    )
+    return [actions, heights]
+
+
+def _construction(easel: Easel) -> Pictures:
+    z = easel.record(ConstructionStage).z
+    vertices = easel.raised(z)
+    mesh = easel.mesh(vertices)
+    shape = render(mesh, size=easel.size, direction=_OBLIQUE, title="construction")
+    title = f"height: {z.min():.1f} to {z.max():.1f} (it was 0 to {easel.vertices[:, 2].max():.1f})"
+    height = render(mesh, size=easel.size, field=z, field_label="z", title=title)
+    return [shape, height]
+
+
+def _restoration(easel: Easel) -> Pictures:
+    """Draw the errors on the left; on the right, one above the other, the worst visible place in close-up."""
+    record = easel.record(RestorationStage)
+    before, after = easel.raised(easel.record(ConstructionStage).z), easel.raised(record.z)
+    error = render(
+        easel.mesh(before),
+        size=easel.size,
+        field=record.order_error,
+        field_range=(0.0, max(float(record.order_error.max(initial=0.0)), 1e-9)),
+        colormap="heat",
+        field_label="order error",
+        title=f"depth order errors, {int(record.solved.sum())} vertices solved again",
+    )
+    worst = int(np.argmax(record.order_error * record.solved * easel.record(VisibilityStage).visible))
+    bounds = _close_up(before, worst) if np.any(record.solved) else _bounds(before, after)
+    half = (easel.size[1] - _GAP) // 2
+    pair = [
+        render(easel.mesh(surface), size=size, direction=_NEAR_FRONT, bounds=bounds, title=title)
+        for surface, size, title in (
+            (before, (easel.size[0], half), "before, at the worst visible place"),
+            (after, (easel.size[0], easel.size[1] - half - _GAP), "after"),
+        )
+    ]
+    strip = np.full((_GAP, easel.size[0], 3), 255, dtype=np.uint8)
+    return [error, np.concatenate([pair[0], strip, pair[1]])]
+
+
+def _compression(easel: Easel) -> Pictures:
+    record = easel.record(CompressionStage)
+    before, after = easel.raised(easel.record(RestorationStage).z), easel.raised(record.z)
+    bounds = _bounds(before, after)
+    depths = [f"{name}: depth {z.max():.1f}" for name, z in (("before", before[:, 2]), ("after", record.z))]
+    depths[0] = f"compression, {depths[0]}"
+    return [
+        render(easel.mesh(vertices), size=easel.size, direction=_SIDE, plate=True, bounds=bounds, title=title)
+        for vertices, title in zip((before, after), depths, strict=True)
+    ]
+
+
+def _trim(easel: Easel) -> Pictures:
+    easel.record(TrimStage)
+    mesh = easel.relief
+    if mesh is None:
+        mesh = easel.mesh(easel.raised(easel.record(CompressionStage).z))
+    return [
+        render(mesh, size=easel.size, plate=True, title="the relief"),
+        render(mesh, size=easel.size, direction=_OBLIQUE, plate=True, title="from the side"),
+    ]
+
+
+PANELS: Mapping[str, Callable[[Easel], Pictures]] = {
+    "scene": _scene,
+    "perspective": _perspective,
+    "visibility": _visibility,
+    "clusters": _clusters,
+    "attenuation": _attenuation,
+    "construction": _construction,
+    "restoration": _restoration,
+    "compression": _compression,
+    "trim": _trim,
+}
+"""What draws each stage, in the order of the stages."""
