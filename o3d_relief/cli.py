@@ -238,7 +238,7 @@ def _demo(options: argparse.Namespace) -> None:
     started = time.perf_counter()
     scene = demo_scene()
     _tell(f"built-in scene: {len(scene.vertices)} vertices, {len(scene.triangles)} triangles")
-    relief = make_relief(scene, on_stage=_tell_stage)
+    relief = make_relief(scene, ReliefParams(alpha=0.8), on_stage=_tell_stage)
     write_mesh(folder / "scene.ply", scene)
     write_mesh(folder / "relief.ply", relief.mesh)
     write_mesh(folder / "relief.glb", relief.mesh)

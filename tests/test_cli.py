@@ -114,6 +114,7 @@ def test_every_option_reaches_the_relief(tmp_path, scene):
     assert values["view"]["vanishing_point"] == [0, 0, -400]
 
 
+@pytest.mark.slow
 def test_stage_pictures(tmp_path, scene):
     folder = tmp_path / "deep" / "pictures"
     assert main(["make", str(scene), str(tmp_path / "r.ply"), "-k", "16", "--stages", str(folder)]) == 0

@@ -26,7 +26,7 @@ __all__ = [
 _SAME_HEIGHT = 1e-6
 """Heights closer than this, in relief units, have no order."""
 
-_DISC = 0.3
+_DISC = 0.5
 """Radius of the disc around a point that is smoothed, in cluster radii."""
 
 _DIRECTIONS = 64
@@ -178,7 +178,7 @@ def smoothing_discs(
     index : (q,) int64
         The fixed points.
     radii : (q,) float64
-        Radius of the cluster of each; the disc is the ball with 0.3 of it.
+        Radius of the cluster of each; the disc is the ball with half of it.
 
     Returns
     -------
