@@ -167,6 +167,10 @@ def _add_params(command: argparse.ArgumentParser) -> None:
         help="the paper's own restoration, without smoothing around the points")  # fmt: skip
     add("--no-in-front", dest="in_front", action="store_false",
         help="the paper's own behaviour: visible parts may end behind the plane and are trimmed")  # fmt: skip
+    add("--no-in-order", dest="in_order", action="store_false",
+        help="the paper's own behaviour: parts may pass through each other")  # fmt: skip
+    add("--min-gap", type=float, default=default.min_gap, metavar="G",
+        help="smallest gap in depth between parts, in the input's unit (default: %(default)s)")  # fmt: skip
     add("--alpha", type=float, metavar="A", help="largest compression ratio (default: no compression)")
     add("--alpha-min", type=float, metavar="A", help="smallest compression ratio (default: half of alpha)")
     add("--depth", type=float, metavar="D", help="exact depth in the input's unit, instead of alpha")

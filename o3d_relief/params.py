@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from o3d_relief.errors import ParameterError
 
@@ -161,6 +162,13 @@ class ReliefParams:
     in_front : bool
         Restore whatever is visible and behind the relief plane, too, so that every visible vertex ends in
         front of it. False: the paper's own behaviour, which trims it.
+    in_order : bool
+        Keep the order of all surfaces along the viewing direction, so that nothing passes through anything,
+        and tie the parts of a scene to each other. False: the paper's own behaviour.
+    min_gap : float
+        Smallest gap along the viewing direction between surfaces one behind the other, in the input's
+        unit, so that they do not fuse in print. Gaps that were smaller before stay as they are at least.
+        Needs `in_order`.
     seed : int
         Seed of the clustering.
 
@@ -186,7 +194,25 @@ class ReliefParams:
     depth: float | None = None
     smooth_points: bool = True
     in_front: bool = True
+    in_order: bool = True
+    min_gap: float = 0.0
     seed: int = 0
+
+    @classmethod
+    def paper(cls, **values: Any) -> ReliefParams:
+        """Return the parameters of the published method, without anything that goes beyond it.
+
+        Parameters
+        ----------
+        **values
+            Other parameters by name.
+
+        Examples
+        --------
+        >>> ReliefParams.paper(k=64).in_order
+        False
+        """
+        return cls(**{"smooth_points": False, "in_front": False, "in_order": False, **values})
 
     def __post_init__(self) -> None:
         set_field = object.__setattr__
@@ -199,9 +225,12 @@ class ReliefParams:
                 "attach_below must not exceed discard_above. "
                 f"Got {self.attach_below:g} and {self.discard_above:g} instead."
             )
-        for name in ("smooth_points", "in_front"):
+        for name in ("smooth_points", "in_front", "in_order"):
             if not isinstance(getattr(self, name), bool):
                 raise ParameterError(f"{name} must be True or False. Got {getattr(self, name)!r} instead.")
+        set_field(self, "min_gap", _check_range("min_gap", self.min_gap, 0.0))
+        if self.min_gap > 0.0 and not self.in_order:
+            raise ParameterError("min_gap needs in_order: a gap cannot be kept where the order is not.")
         set_field(self, "seed", _check_integer("seed", self.seed, 0, 2**32 - 1))
         self._check_compression()
 

@@ -20,6 +20,7 @@ __all__ = [
     "ClustersStage",
     "CompressionStage",
     "ConstructionStage",
+    "OrderStage",
     "PerspectiveStage",
     "RestorationStage",
     "SceneStage",
@@ -195,6 +196,20 @@ class RestorationStage(StageRecord):
     name: ClassVar[str] = "restoration"
     order_error: NDArray[np.float64]
     solved: NDArray[np.bool_]
+    z: NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class OrderStage(StageRecord):
+    """Everything in order along the viewing direction, beyond the paper.
+
+    Attributes
+    ----------
+    z : (n,) float64
+        Equal to that of the restoration where the order is not kept (``in_order=False``).
+    """
+
+    name: ClassVar[str] = "order"
     z: NDArray[np.float64]
 
 

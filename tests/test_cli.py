@@ -102,13 +102,13 @@ def test_every_option_reaches_the_relief(tmp_path, scene):
     }  # fmt: skip
     words = [word for pair in options.items() for word in pair]
     points = ["--viewpoint", "0", "0", "900", "--vanishing-point", "0", "0", "-400"]
-    switches = ["--no-smooth-points", "--no-in-front", "--report", str(report)]
+    switches = ["--no-smooth-points", "--no-in-front", "--no-in-order", "--report", str(report)]
     assert main(["make", str(scene), str(tmp_path / "r.ply"), *words, *points, *switches]) == 0
     values = json.loads(report.read_text())
     assert values["params"] == {
         "k": 8, "beta": [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8], "discard_above": 0.9, "attach_below": 0.1,
         "max_order_error": 0.4, "blend": 0.5, "alpha": 0.7, "alpha_min": 0.2, "depth": None,
-        "smooth_points": False, "in_front": False, "seed": 3,
+        "smooth_points": False, "in_front": False, "in_order": False, "min_gap": 0.0, "seed": 3,
     }  # fmt: skip
     assert values["view"]["viewpoint"] == [0, 0, 900]
     assert values["view"]["vanishing_point"] == [0, 0, -400]
@@ -120,8 +120,8 @@ def test_stage_pictures(tmp_path, scene):
     assert main(["make", str(scene), str(tmp_path / "r.ply"), "-k", "16", "--stages", str(folder)]) == 0
     names = [p.name for p in sorted(folder.iterdir())]
     assert names[0] == "01_scene.png"
-    assert names[-1] == "09_trim.png"
-    assert len(names) == 9
+    assert names[-1] == "10_trim.png"
+    assert len(names) == 10
 
 
 def test_missing_input(tmp_path, capsys):
@@ -210,4 +210,4 @@ def test_demo(tmp_path):
     assert main(["demo", str(tmp_path / "demo")]) == 0
     names = _files(tmp_path / "demo")
     assert {"sheet.png", "relief.ply", "relief.glb", "scene.ply", "report.json"} <= set(names)
-    assert sum(name.startswith("stages/") for name in names) == 9
+    assert sum(name.startswith("stages/") for name in names) == 10

@@ -15,6 +15,7 @@ STAGES = [
     "attenuation",
     "construction",
     "restoration",
+    "order",
     "compression",
     "trim",
 ]
@@ -71,7 +72,7 @@ def test_shapes_and_values_of_the_records(relief):
     assert points.rho.min() == 0
     assert points.rho.max() == 1
     assert np.array_equal(points.beta, np.full(len(points.index), 0.2))
-    for name in ("construction", "restoration", "compression"):
+    for name in ("construction", "restoration", "order", "compression"):
         assert s[name].z.shape == (n,)
     error = s["restoration"].order_error
     assert error.min() == 0
@@ -109,7 +110,7 @@ def test_relief_stands_on_the_plane_and_is_shallower(relief, mesh):
 
 
 def test_paper_s_own_rules_leave_some_behind(mesh):
-    params = rel.ReliefParams(k=24, smooth_points=False, in_front=False)
+    params = rel.ReliefParams.paper(k=24)
     stages = rel.make_relief(mesh, params).stages
     solved = stages["restoration"].solved
     assert np.array_equal(solved, stages["restoration"].order_error >= 0.2)
@@ -223,7 +224,7 @@ def test_shallower_relief_than_asked_for_is_left_alone(mesh, relief):
 
 def test_alpha_compresses_the_low_more_than_the_high(mesh):
     s = rel.make_relief(mesh, rel.ReliefParams(k=24, alpha=0.8)).stages
-    alpha, z = s["compression"].alpha, s["restoration"].z
+    alpha, z = s["compression"].alpha, s["order"].z
     assert alpha[z.argmax()] == 0.8
     assert alpha[z.argmin()] == 0.4
     assert np.array_equal(s["compression"].z, alpha * z)
@@ -252,9 +253,12 @@ def test_view_from_another_side(mesh):
 
 def test_parts_that_hold_no_point_are_counted_and_moved(mesh):
     ball = moved(sphere(6, radius=2.0), (0, 0, -20))  # hidden inside the body
-    relief = rel.make_relief(to_mesh(joined(bust(), ball)), PARAMS)
+    relief = rel.make_relief(to_mesh(joined(bust(), ball)), rel.ReliefParams(k=24, in_order=False))
     assert relief.stages["construction"].counts["components"] == 2
     assert relief.stages["construction"].counts["loose_components"] == 1
+    tied = rel.make_relief(to_mesh(joined(bust(), ball)), PARAMS)
+    assert tied.stages["construction"].counts["loose_components"] == 0
+    assert tied.stages["construction"].counts["ties_across_gaps"] > 0
 
 
 def test_attributes_survive_the_weld_and_the_cut():

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-__all__ = ["cotangent_laplacian", "mended_cotangents"]
+__all__ = ["cotangent_laplacian", "mended_cotangents", "vertex_areas"]
 
 _SLACK = 1e-3
 """A triangle whose longest edge is shorter than the two others together by less than this share of it
@@ -89,3 +89,26 @@ def cotangent_laplacian(vertices: NDArray[np.float64], faces: NDArray[np.int64])
     weights = half + half.T
     diagonal = sp.dia_array((weights.sum(axis=1)[None, :], [0]), shape=(n, n))
     return (diagonal - weights).tocsr(), slivers
+
+
+def vertex_areas(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the area of each vertex, a third of that of its faces.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+    faces : (m, 3) int64
+
+    Returns
+    -------
+    (n,) float64
+
+    Examples
+    --------
+    >>> vertex_areas(np.array([[0, 0, 0], [3, 0, 0], [0, 2, 0.0]]), np.array([[0, 1, 2]])).tolist()
+    [1.0, 1.0, 1.0]
+    """
+    a, b, c = vertices[faces].transpose(1, 0, 2)
+    thirds = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
+    areas = np.bincount(faces.ravel(), weights=np.repeat(thirds, 3), minlength=len(vertices))
+    return areas.astype(np.float64)

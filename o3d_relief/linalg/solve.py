@@ -67,7 +67,7 @@ def solve_spd(
             solution = _multigrid(matrix, right_hand_side, matrix if similar is None else similar, tolerance)
         residual = np.linalg.norm(matrix @ solution - right_hand_side)
         reached = float(residual / np.linalg.norm(right_hand_side))
-    if not reached <= _GOOD_ENOUGH:
+    if not reached <= max(_GOOD_ENOUGH, 10.0 * tolerance):
         raise SolverError(
             f"A linear system of {n} unknowns was solved to {reached:.1e} only, not to {_GOOD_ENOUGH:.0e}; "
             "the mesh is likely broken near very thin triangles: repair or remesh it."

@@ -15,6 +15,7 @@ from o3d_relief.records import (
     ClustersStage,
     CompressionStage,
     ConstructionStage,
+    OrderStage,
     PerspectiveStage,
     RestorationStage,
     SceneStage,
@@ -242,9 +243,34 @@ def _restoration(easel: Easel) -> Pictures:
     return [error, np.concatenate([pair[0], strip, pair[1]])]
 
 
+def _order(easel: Easel) -> Pictures:
+    """Draw the surface before on the left, and after, with what was corrected in colour, on the right."""
+    record = easel.record(OrderStage)
+    restored = easel.record(RestorationStage).z
+    before, after = easel.raised(restored), easel.raised(record.z)
+    moved = record.z - restored
+    largest = max(float(np.abs(moved).max()), 1e-9)
+    bounds = _bounds(before, after)
+    count = record.counts.get("pairs_corrected", 0)
+    return [
+        render(easel.mesh(before), size=easel.size, plate=True, bounds=bounds, title="before"),
+        render(
+            easel.mesh(after),
+            size=easel.size,
+            plate=True,
+            bounds=bounds,
+            field=moved,
+            field_range=(-largest, largest),
+            colormap="diverging",
+            field_label="moved",
+            title=f"in order: {count} pairs kept apart",
+        ),
+    ]
+
+
 def _compression(easel: Easel) -> Pictures:
     record = easel.record(CompressionStage)
-    before, after = easel.raised(easel.record(RestorationStage).z), easel.raised(record.z)
+    before, after = easel.raised(easel.record(OrderStage).z), easel.raised(record.z)
     bounds = _bounds(before, after)
     depths = [f"{name}: depth {z.max():.1f}" for name, z in (("before", before[:, 2]), ("after", record.z))]
     depths[0] = f"compression, {depths[0]}"
@@ -273,6 +299,7 @@ PANELS: Mapping[str, Callable[[Easel], Pictures]] = {
     "attenuation": _attenuation,
     "construction": _construction,
     "restoration": _restoration,
+    "order": _order,
     "compression": _compression,
     "trim": _trim,
 }

@@ -25,7 +25,7 @@ class Construction:
     components : int
         Connected components of the mesh.
     loose_components : int
-        Components without a fixed point, which were moved as a whole.
+        Components, or tied groups of them, without a fixed point, which were moved as a whole.
     """
 
     z: NDArray[np.float64]
@@ -38,6 +38,9 @@ def construct(
     laplacian: sp.csr_array,
     index: NDArray[np.int64],
     new_height: NDArray[np.float64],
+    *,
+    ties: sp.csr_array | None = None,
+    pull: NDArray[np.float64] | None = None,
 ) -> Construction:
     """Find the z of all vertices from fixed points and differential coordinates.
 
@@ -47,8 +50,11 @@ def construct(
     written for the displacement d = z' - z, it says that d is discrete harmonic: C_ff d_f = -C_fc d_c
     with the symmetric cotangent Laplacian C. Solving for d avoids the cancellation in L z.
 
-    A connected component without a fixed point has no equation. It moves as a whole, by the displacement
-    of the nearest vertex (in space) of the components that have one, so that Eq. 7 holds on it as well.
+    Springs between components may be added to the system: (C + ties)_ff d_f = pull_f - (C + ties)_fc d_c.
+
+    A connected component without a fixed point, and not tied to one, has no equation. It moves as a
+    whole, by the displacement of the nearest vertex (in space) of the components that have one, so that
+    Eq. 7 holds on it as well.
 
     Parameters
     ----------
@@ -60,6 +66,10 @@ def construct(
         The fixed vertices, at least one, each once.
     new_height : (q,) float64
         Their z.
+    ties : (n, n) sparse float64, optional
+        Quadratic form of the springs.
+    pull : (n,) float64, optional
+        Their right-hand side; zero where omitted.
 
     Returns
     -------
@@ -71,8 +81,10 @@ def construct(
         The linear system could not be solved.
     """
     z = vertices[:, 2]
-    components, label = connected_components(laplacian, directed=False)
-    has_point = np.zeros(components, dtype=bool)
+    components, _ = connected_components(laplacian, directed=False)
+    system = laplacian if ties is None else (laplacian + ties).tocsr()
+    groups, label = connected_components(system, directed=False)
+    has_point = np.zeros(groups, dtype=bool)
     has_point[label[index]] = True
     controlled = has_point[label]
     fixed = np.zeros(len(z), dtype=bool)
@@ -81,8 +93,11 @@ def construct(
     displacement[index] = new_height - z[index]
 
     free = np.flatnonzero(controlled & ~fixed)
-    rows = laplacian[free]
-    displacement[free] = solve_spd(rows[:, free].tocsr(), -(rows @ displacement))
+    rows = system[free]
+    right_hand_side = -(rows @ displacement)
+    if pull is not None:
+        right_hand_side += pull[free]
+    displacement[free] = solve_spd(rows[:, free].tocsr(), right_hand_side)
     _move_loose(vertices, label, controlled, displacement)
 
     moved = z + displacement

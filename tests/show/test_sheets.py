@@ -13,6 +13,7 @@ from o3d_relief.records import (
     ClustersStage,
     CompressionStage,
     ConstructionStage,
+    OrderStage,
     PerspectiveStage,
     RestorationStage,
     SceneStage,
@@ -29,6 +30,7 @@ NAMES = [
     "attenuation",
     "construction",
     "restoration",
+    "order",
     "compression",
     "trim",
 ]
@@ -69,6 +71,7 @@ def make_stages():
         ),
         ConstructionStage(z=z - 3.0),
         RestorationStage(order_error=error, solved=error > 0.2, z=z),
+        OrderStage(z=z + 2.0 * (labels == 0), counts={"pairs_corrected": 7}),
         CompressionStage(alpha=np.full(n, 0.5), z=0.5 * z),
         TrimStage(),
     ]

@@ -1,0 +1,329 @@
+"""One step of the pipeline each: takes what the steps before have found, returns its record."""
+
+from __future__ import annotations
+
+from typing import cast
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from o3d_relief.bounds.order import keep_order
+from o3d_relief.bounds.pairs import Pairs, grid_pairs, vertex_pairs
+from o3d_relief.bounds.parts import tie_parts
+from o3d_relief.errors import MeshError, ParameterError
+from o3d_relief.linalg.laplacian import vertex_areas
+from o3d_relief.params import ReliefParams, Triple, View
+from o3d_relief.records import (
+    AttenuationStage,
+    ClustersStage,
+    CompressionStage,
+    ConstructionStage,
+    OrderStage,
+    PerspectiveStage,
+    RestorationStage,
+    SceneStage,
+    VisibilityStage,
+)
+from o3d_relief.scene.frame import Frame, relief_frame, to_relief_units
+from o3d_relief.scene.weld import weld
+from o3d_relief.stages.attenuation import (
+    actions,
+    attenuate,
+    differentials,
+    nearest_neighbours,
+    new_heights,
+    relative_differentials,
+    select_points,
+)
+from o3d_relief.stages.clustering import cluster_vertices
+from o3d_relief.stages.compression import alpha_for_depth, compress
+from o3d_relief.stages.construction import construct
+from o3d_relief.stages.perspective import forced_perspective
+from o3d_relief.stages.restoration import (
+    cluster_radii,
+    lifting_discs,
+    order_errors,
+    restore,
+    smoothing_discs,
+)
+from o3d_relief.stages.trim import Trimmed, trim_behind
+from o3d_relief.stages.visibility import visible_vertices
+
+_ON_PLANE = 1e-9
+"""Heights within this of S, in relief units, lie on it: rounding errors leave no slivers at the cut."""
+
+
+def frame_step(vertices: NDArray[np.float64], faces: NDArray[np.int64], view: View) -> Frame:
+    """Find the relief frame from the vertices that faces use."""
+    used = np.zeros(len(vertices), dtype=bool)
+    used[faces] = True
+    front, up = cast(Triple, view.front), cast(Triple, view.up)  # View has checked and converted both
+    frame = relief_frame(vertices[used], front, up)
+    # Vertices that no face uses may be anything, infinite even: they take no part.
+    vertices[~used] = frame.origin
+    return frame
+
+
+def scene_step(
+    in_vertices: NDArray[np.float64], in_faces: NDArray[np.int64], frame: Frame, params: ReliefParams
+) -> SceneStage:
+    """Bring the scene into the relief frame and weld it."""
+    welded = weld(to_relief_units(in_vertices, frame, on_grid=True), in_faces)
+    if len(welded.faces) == 0:
+        raise MeshError(f"None of the {len(in_faces)} triangles of the mesh has three different corners.")
+    if params.k > len(welded.vertices):
+        raise ParameterError(
+            f"k must be at most the number of vertices, {len(welded.vertices)} after welding. "
+            f"Got {params.k} instead."
+        )
+    return SceneStage(
+        vertices=welded.vertices,
+        faces=welded.faces,
+        welded_index=welded.index,
+        unit=frame.unit,
+        counts={
+            "input_vertices": len(in_vertices),
+            "input_faces": len(in_faces),
+            "vertices": len(welded.vertices),
+            "faces": len(welded.faces),
+            "merged_vertices": welded.merged_vertices,
+            "unreferenced_vertices": welded.unreferenced_vertices,
+            "degenerate_faces": welded.degenerate_faces,
+            "duplicate_faces": welded.duplicate_faces,
+        },
+    )
+
+
+def perspective_step(vertices: NDArray[np.float64], view: View) -> PerspectiveStage:
+    """Draw the scene towards the vanishing point, if there is one."""
+    if view.vanishing_point is None:
+        return PerspectiveStage(vertices=vertices)
+    plane = None if view.viewpoint is None else view.viewpoint[2]
+    return PerspectiveStage(vertices=forced_perspective(vertices, view.vanishing_point, view_plane=plane))
+
+
+def visibility_step(vertices: NDArray[np.float64], faces: NDArray[np.int64], view: View) -> VisibilityStage:
+    """Find what the viewpoint sees."""
+    visible = visible_vertices(vertices, faces, viewpoint=view.viewpoint)
+    if not visible.any():
+        raise MeshError("No vertex of the scene is visible from the viewpoint.")
+    return VisibilityStage(visible=visible, counts={"visible": int(visible.sum())})
+
+
+def clusters_step(vertices: NDArray[np.float64], params: ReliefParams) -> ClustersStage:
+    """Partition the vertices on x and y."""
+    labels, centers = cluster_vertices(vertices[:, :2], params.k, seed=params.seed)
+    return ClustersStage(
+        labels=labels,
+        centers=centers,
+        counts={"clusters": len(centers), "fewer_than_k": params.k - len(centers)},
+    )
+
+
+def _beta_of_points(params: ReliefParams, cluster: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the attenuation factor of each point; a sequence counts by points or by clusters."""
+    if isinstance(params.beta, float | int):
+        return np.full(len(cluster), float(params.beta))
+    beta = np.array(params.beta, dtype=np.float64)
+    if len(beta) == params.k:
+        return np.asarray(beta[cluster])
+    if len(beta) == len(cluster):
+        return beta
+    raise ParameterError(
+        f"beta must be one number or one for each of the {len(cluster)} attenuation points. "
+        f"Got {len(beta)} numbers instead."
+    )
+
+
+def attenuation_step(
+    vertices: NDArray[np.float64], visible: NDArray[np.bool_], clusters: ClustersStage, params: ReliefParams
+) -> AttenuationStage:
+    """Choose the attenuation points and find their new heights."""
+    index, cluster = select_points(vertices, visible, clusters.labels, clusters.centers)
+    height = vertices[index, 2]
+    differential = differentials(height, nearest_neighbours(vertices[index, :2], symmetric=False))
+    rho = relative_differentials(differential)
+    beta = _beta_of_points(params, cluster)
+    action = actions(rho, discard_above=params.discard_above, attach_below=params.attach_below)
+    settled = new_heights(vertices[index], rho, action, beta)
+    return AttenuationStage(
+        index=index,
+        cluster=cluster,
+        height=height,
+        differential=differential,
+        rho=rho,
+        beta=beta,
+        action=settled.action,
+        new_height=settled.new_height,
+        counts={
+            "points": len(index),
+            "clusters_without_visible_vertex": len(clusters.centers) - len(index),
+            "attach": int((settled.action == "attach").sum()),
+            "scale": int((settled.action == "scale").sum()),
+            "discard": int((settled.action == "discard").sum()),
+            "groups_attached": settled.groups_attached,
+        },
+    )
+
+
+def _behind(z: NDArray[np.float64], visible: NDArray[np.bool_]) -> int:
+    return int((z[visible] < -_ON_PLANE).sum())
+
+
+def stacked_pairs(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], params: ReliefParams
+) -> Pairs | None:
+    """Find what must keep its order at the vertices; None where the order is not kept."""
+    return vertex_pairs(vertices, faces) if params.in_order else None
+
+
+def construction_step(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    visible: NDArray[np.bool_],
+    laplacian: sp.csr_array,
+    slivers: int,
+    clusters: ClustersStage,
+    points: AttenuationStage,
+    pairs: Pairs | None,
+) -> ConstructionStage:
+    """Rebuild the surface around the points, with its loose parts tied to the rest."""
+    ties = None
+    if pairs is not None:
+        beta = _beta_of_clusters(points, len(clusters.centers))[clusters.labels[pairs.upper[:, 0]]]
+        ties = tie_parts(vertices, faces, laplacian, pairs, attenuate(pairs.gap, beta))
+    built = construct(
+        vertices,
+        laplacian,
+        points.kept_index,
+        points.kept_height,
+        ties=None if ties is None else ties.form,
+        pull=None if ties is None else ties.pull,
+    )
+    counts = {
+        "fixed_points": len(points.kept_index),
+        "slivers_mended": slivers,
+        "components": built.components,
+        "loose_components": built.loose_components,
+        "visible_behind": _behind(built.z, visible),
+    }
+    if ties is not None:
+        counts |= {
+            "ties_across_gaps": ties.across_gaps,
+            "ties_in_contact": ties.in_contact,
+            "ties_to_nearest": ties.to_nearest,
+        }
+    return ConstructionStage(z=built.z, counts=counts)
+
+
+def _beta_of_clusters(points: AttenuationStage, clusters: int) -> NDArray[np.float64]:
+    """Return the attenuation factor of each cluster; one without a point takes the median."""
+    beta = np.full(clusters, float(np.median(points.beta)))
+    beta[points.cluster] = points.beta
+    return beta
+
+
+def restoration_step(
+    vertices: NDArray[np.float64],
+    visible: NDArray[np.bool_],
+    laplacian: sp.csr_array,
+    z: NDArray[np.float64],
+    clusters: ClustersStage,
+    points: AttenuationStage,
+    params: ReliefParams,
+) -> RestorationStage:
+    """Find order errors and pimples, and what is visible behind S, and mend them."""
+    index = points.kept_index
+    own_cluster = clusters.labels[index]
+    radii = cluster_radii(vertices[:, :2], clusters.labels, len(clusters.centers))[own_cluster]
+    error = order_errors(vertices, z, index, radii)
+    high = error >= params.max_order_error
+    counts = {"high_errors": int(high.sum())}
+    if params.smooth_points:
+        high |= smoothing_discs(vertices, index, radii)
+    if params.in_front:
+        high |= lifting_discs(vertices, z, visible)
+    bounded = visible if params.in_front else None
+    restored = restore(vertices, laplacian, z, high, index, blend=params.blend, in_front=bounded)
+    counts |= {
+        "solved": int(restored.solved.sum()),
+        "points_held": restored.points_held,
+        "set_on_plane": restored.set_on_plane,
+        "visible_behind": _behind(restored.z, visible),
+    }
+    return RestorationStage(order_error=error, solved=restored.solved, z=restored.z, counts=counts)
+
+
+def order_step(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    visible: NDArray[np.bool_],
+    laplacian: sp.csr_array,
+    z: NDArray[np.float64],
+    pairs: Pairs | None,
+    params: ReliefParams,
+    unit: float,
+) -> OrderStage:
+    """Keep everything in order along the viewing direction."""
+    if pairs is None:
+        return OrderStage(z=z)
+    # The compression comes later and shrinks gaps, at most by its smallest ratio.
+    ratio, lowest = _ratios(z, params, unit)
+    min_gap = params.min_gap / unit / (0.95 * lowest if ratio < 1.0 else 1.0)
+    ordered = keep_order(
+        vertices,
+        laplacian,
+        vertex_areas(vertices, faces),
+        z,
+        [pairs, grid_pairs(vertices, faces)],
+        in_front=visible if params.in_front else None,
+        min_gap=min_gap,
+    )
+    counts = {
+        "pairs_corrected": ordered.corrected_pairs,
+        "rounds": ordered.rounds,
+        "left": ordered.left,
+        "visible_behind": _behind(ordered.z, visible),
+    }
+    return OrderStage(z=ordered.z, counts=counts)
+
+
+def _ratios(z: NDArray[np.float64], params: ReliefParams, unit: float) -> tuple[float, float]:
+    """Return the largest and the smallest compression ratio, 1 and 1 for no compression."""
+    alpha, lowest = params.alpha, params.alpha_min
+    if params.depth is not None:
+        alpha = alpha_for_depth(z, params.depth / unit)
+        if alpha == 1.0:
+            return 1.0, 1.0  # what is shallow enough already is left alone
+        return alpha, alpha / 2.0 if lowest is None else min(lowest, alpha)
+    if alpha is None:
+        return 1.0, 1.0 if lowest is None else lowest
+    return alpha, alpha / 2.0 if lowest is None else lowest
+
+
+def compression_step(z: NDArray[np.float64], params: ReliefParams, unit: float) -> CompressionStage:
+    """Compress the range, to the depth that was asked for."""
+    largest, smallest = _ratios(z, params, unit)
+    counts = {} if params.depth is None else {"already_shallower": int(largest == 1.0)}
+    if smallest == 1.0:
+        return CompressionStage(alpha=np.ones(len(z)), z=z, counts=counts)
+    ratio, compressed = compress(z, alpha=largest, alpha_min=smallest)
+    return CompressionStage(alpha=ratio, z=compressed, counts=counts)
+
+
+def trim_step(
+    in_vertices: NDArray[np.float64],
+    in_faces: NDArray[np.int64],
+    frame: Frame,
+    scene: SceneStage,
+    vertices: NDArray[np.float64],
+    z: NDArray[np.float64],
+) -> Trimmed:
+    """Move every input vertex as its welded vertex moved, and cut at S; the result is in the input's unit."""
+    usable = scene.welded_index >= 0
+    welded = scene.welded_index[usable]
+    moved = to_relief_units(in_vertices, frame)
+    moved[usable, :2] += (vertices - scene.vertices)[welded, :2]
+    moved[usable, 2] = np.where(np.abs(z) < _ON_PLANE, 0.0, z)[welded]
+    return trim_behind(moved * frame.unit, in_faces, usable)
