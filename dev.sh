@@ -2,7 +2,7 @@
 # Everything a developer or a visitor needs, from a bare Debian or Ubuntu on.
 #
 #   sh dev.sh demo [DIR]           set up, and make a relief of the built-in scene
-#   sh dev.sh test [PYTEST...]     set up, and run the tests; without arguments all but the slow ones
+#   sh dev.sh test [PYTEST...]     set up, and run the tests, without -m all but the slow ones
 #   sh dev.sh lint                 set up, and run ruff and mypy
 #   sh dev.sh bench NAME [ARG...]  set up, and run benchmarks/NAME.py
 #   sh dev.sh setup                set up only
@@ -38,7 +38,9 @@ system_packages() {
     if [ -z "$found" ]; then
         wanted="$wanted python3 python3-venv"
     elif ! "$found" -c 'import ensurepip, venv' 2>/dev/null; then
-        wanted="$wanted python3-venv"
+        # Debian's own python3 needs python3-venv, another version its own package.
+        version=$("$found" -c 'import sys; print("%d.%d" % sys.version_info[:2])')
+        wanted="$wanted python$version-venv"
     fi
     for package in $wanted; do
         state=$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null || true)
@@ -61,7 +63,7 @@ system_packages() {
 }
 
 setup() {
-    stamp="$venv/.o3d-relief-$(cksum <"$root/pyproject.toml" | tr ' ' '-')"
+    stamp="$venv/.o3d-relief-$( (echo "$root"; cat "$root/pyproject.toml") | cksum | tr ' ' '-')"
     [ -f "$stamp" ] && [ -x "$venv/bin/python" ] && return 0
     system_packages
     python=$(find_python)
@@ -82,12 +84,15 @@ setup)
     ;;
 demo)
     setup
-    exec "$venv/bin/o3d-relief" demo "$@"
+    exec "$venv/bin/python" -m o3d_relief demo "$@"
     ;;
 test)
     setup
     cd "$root"
-    [ $# -gt 0 ] || set -- -m 'not slow'
+    case " $* " in
+    *" -m "*) ;;
+    *) set -- "$@" -m 'not slow' ;;
+    esac
     exec "$venv/bin/python" -m pytest "$@"
     ;;
 lint)

@@ -5,13 +5,15 @@ from __future__ import annotations
 import argparse
 import json
 import re
+import signal
 import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
-from o3d_relief.errors import FileError, ReliefError
+from o3d_relief import __version__
+from o3d_relief.errors import FileError, MeshError, ReliefError
 from o3d_relief.files import check_exists, check_place, write_bytes
 from o3d_relief.params import ReliefParams, View
 
@@ -40,16 +42,38 @@ def main(arguments: Sequence[str] | None = None) -> int:
         Exit code: 0, 2 for anything the user can mend, 130 when interrupted.
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
-    options = _parser().parse_args(_join_points(given))
+    signals: list[int] = []
+
+    def stop(number: int, _frame: object) -> None:
+        signals.append(number)
+        raise KeyboardInterrupt
+
+    # SIGTERM ends like Ctrl-C, so that what is half done is cleaned away.
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
+        options = _parser().parse_args(_join_points(given))
         options.run(options)
     except ReliefError as error:
         sys.stderr.write(f"o3d-relief: error: {error}\n")
         return 2
-    except KeyboardInterrupt:
-        sys.stderr.write("o3d-relief: interrupted, nothing was written for the unfinished step.\n")
-        return 130
+    except (KeyboardInterrupt, ImportError):
+        # An interrupted import of Open3D arrives as an ImportError.
+        if not signals:
+            raise
+        sys.stderr.write("o3d-relief: interrupted; no file is left half-written.\n")
+        return 128 + signals[0]
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
     return 0
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser that says what is wrong in one sentence."""
+
+    def error(self, message: str) -> NoReturn:
+        sys.stderr.write(f"{self.prog}: error: {message} (see {self.prog} --help)\n")
+        raise SystemExit(2)
 
 
 def _join_points(arguments: list[str]) -> list[str]:
@@ -73,7 +97,9 @@ def _numbers(text: str) -> tuple[float, ...]:
     try:
         return tuple(float(item) for item in text.split(","))
     except ValueError:
-        raise argparse.ArgumentTypeError(f"must be numbers. Got {text!r} instead.") from None
+        raise argparse.ArgumentTypeError(
+            f"must be numbers with commas between them. Got {text!r} instead."
+        ) from None
 
 
 def _point(text: str) -> tuple[float, ...]:
@@ -84,7 +110,14 @@ def _point(text: str) -> tuple[float, ...]:
 
 
 def _direction(text: str) -> str | tuple[float, ...]:
-    return text if _AXIS.match(text) else _point(text)
+    if _AXIS.match(text):
+        return text
+    try:
+        return _point(text)
+    except argparse.ArgumentTypeError:
+        raise argparse.ArgumentTypeError(
+            f"must be x, -x, y, -y, z, -z or three numbers. Got {text!r} instead."
+        ) from None
 
 
 def _beta(text: str) -> float | tuple[float, ...]:
@@ -93,15 +126,14 @@ def _beta(text: str) -> float | tuple[float, ...]:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="o3d-relief", description="Make high reliefs from 3D scenes.", allow_abbrev=False
-    )
+    parser = _Parser(prog="o3d-relief", description="Make high reliefs from 3D scenes.", allow_abbrev=False)
+    parser.add_argument("--version", action="version", version=f"o3d-relief {__version__}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
 
     make = commands.add_parser(
         "make", help="make a relief of a mesh file", description="Make a relief of a mesh file."
     )
-    make.add_argument("input", type=Path, metavar="INPUT", help="PLY, OBJ, STL, OFF or GLB file")
+    make.add_argument("input", type=Path, metavar="INPUT", help="PLY, OBJ, STL, OFF, GLB or glTF file")
     make.add_argument("output", type=Path, metavar="OUTPUT", help="PLY, OBJ, STL or GLB file")
     _add_view(make)
     _add_params(make)
@@ -204,11 +236,7 @@ def _tell_stage(record: StageRecord) -> None:
 def _make(options: argparse.Namespace) -> None:
     params, view = _params(options), _view(options)
     check_exists(options.input)
-    for place in (options.output, options.report):
-        if place is not None:
-            check_place(place)
-    if options.stages is not None:
-        _make_folder(options.stages)
+    _check_places(options)
 
     from o3d_relief.pipeline import make_relief
     from o3d_relief.scene.read import read_mesh
@@ -218,7 +246,10 @@ def _make(options: argparse.Namespace) -> None:
     started = time.perf_counter()
     mesh = read_mesh(options.input)
     _tell(f"{options.input}: {len(mesh.vertices)} vertices, {len(mesh.triangles)} triangles")
-    relief = make_relief(mesh, params, view=view, on_stage=_tell_stage)
+    try:
+        relief = make_relief(mesh, params, view=view, on_stage=_tell_stage)
+    except MeshError as error:
+        raise MeshError(f"{options.input}: {error}") from error
     write_mesh(options.output, relief.mesh)
     if options.report is not None:
         _write_report(options.report, relief)
@@ -227,9 +258,23 @@ def _make(options: argparse.Namespace) -> None:
     _tell_result(options.output, relief, time.perf_counter() - started)
 
 
+def _check_places(options: argparse.Namespace) -> None:
+    """Check before the long work that everything can be written, and nothing over something else."""
+    check_place(options.output)
+    taken = {options.input.resolve(): "the input", options.output.resolve(): "the output"}
+    if len(taken) == 1:
+        raise FileError(f"{options.output} is the input, which would be lost: choose another output.")
+    if options.report is not None:
+        check_place(options.report)
+        if options.report.resolve() in taken:
+            raise FileError(f"{options.report} is {taken[options.report.resolve()]}: choose another report.")
+    if options.stages is not None and options.stages.exists() and not options.stages.is_dir():
+        raise FileError(f"{options.stages} is a file, not a folder for pictures.")
+
+
 def _demo(options: argparse.Namespace) -> None:
     folder = options.directory
-    _make_folder(folder / "stages")
+    _make_folder(folder)
 
     import numpy as np
 
@@ -268,12 +313,19 @@ def _write_report(path: Path, relief: Relief) -> None:
 def _write_stages(folder: Path, relief: Relief) -> None:
     from o3d_relief.show.sheets import save_stage_pictures
 
-    _tell(f"drawing {len(relief.stages)} stage pictures")
-    save_stage_pictures(relief.stages, folder, relief=relief.mesh)
+    _make_folder(folder)
+    _tell(f"drawing {len(relief.stages)} stage pictures, a few seconds each")
+    save_stage_pictures(
+        relief.stages, folder, relief=relief.mesh, on_picture=lambda picture: _tell(f"  {picture}")
+    )
 
 
 def _tell_result(path: Path, relief: Relief, seconds: float) -> None:
     report = relief.report()
+    if relief.stages["compression"].counts.get("already_shallower"):
+        _tell(
+            f"the relief is {report['relief_depth']:.4g} deep, less than was asked for: it is not stretched"
+        )
     _tell(
         f"{path}: {report['vertices']} vertices, {report['triangles']} triangles; "
         f"depth {report['scene_depth']:.4g} -> {report['relief_depth']:.4g}, {seconds:.1f} s in all"

@@ -17,11 +17,11 @@ Triple = tuple[float, float, float]
 
 
 def _check_number(name: str, value: object) -> float:
-    if isinstance(value, bool):
+    if isinstance(value, bool | str) or type(value).__name__ == "bool":  # numpy's bool, too
         raise ParameterError(f"{name} must be a number. Got {value!r} instead.")
     try:
         number = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ParameterError(f"{name} must be a number. Got {value!r} instead.") from None
     if not math.isfinite(number):
         raise ParameterError(f"{name} must be finite. Got {value!r} instead.")
@@ -31,7 +31,7 @@ def _check_number(name: str, value: object) -> float:
 def _check_range(name: str, value: object, low: float, high: float = math.inf) -> float:
     number = _check_number(name, value)
     if not low <= number <= high:
-        wanted = f"at least {low:g}" if high == math.inf else f"between {low:g} and {high:g}"
+        wanted = f"at least {low:g}" if high > 1e6 else f"between {low:g} and {high:g}"
         raise ParameterError(f"{name} must be {wanted}. Got {value!r} instead.")
     return number
 
@@ -44,9 +44,13 @@ def _check_integer(name: str, value: object, low: int, high: int) -> int:
 
 
 def _check_triple(name: str, value: object) -> Triple:
-    if isinstance(value, str) or not hasattr(value, "__len__") or len(value) != 3:
+    try:
+        items: tuple[object, ...] = () if isinstance(value, str) else tuple(value)  # type: ignore[arg-type]
+    except TypeError:
+        items = ()
+    if len(items) != 3:
         raise ParameterError(f"{name} must be three numbers. Got {value!r} instead.")
-    x, y, z = (_check_number(name, item) for item in value)  # type: ignore[attr-defined]
+    x, y, z = (_check_number(name, item) for item in items)
     return (x, y, z)
 
 
@@ -59,17 +63,27 @@ def _check_direction(name: str, value: object) -> Triple:
                 f"{name} must be x, -x, y, -y, z, -z or three numbers. Got {value!r} instead."
             )
         sign = -1.0 if value.startswith("-") else 1.0
-        return (sign * axis[0], sign * axis[1], sign * axis[2])
-    direction = _check_triple(name, value)
-    if not any(direction):
+        return (sign * axis[0] + 0.0, sign * axis[1] + 0.0, sign * axis[2] + 0.0)
+    x, y, z = _check_triple(name, value)
+    largest = max(abs(x), abs(y), abs(z))
+    if largest == 0.0:
         raise ParameterError(f"{name} must not be the zero vector. Got {value!r} instead.")
-    return direction
+    # Only the direction counts; its squares must neither overflow nor vanish.
+    return (x / largest + 0.0, y / largest + 0.0, z / largest + 0.0)
+
+
+def _words(direction: Triple) -> str:
+    return ", ".join(f"{c:g}" for c in direction)
 
 
 def _check_beta(value: float | Sequence[float]) -> float | tuple[float, ...]:
-    if isinstance(value, int | float | str) or not hasattr(value, "__len__"):
+    if isinstance(value, int | float | str):
         return _check_range("beta", value, 0.0)
-    return tuple(_check_range("beta", item, 0.0) for item in value)
+    try:
+        items = tuple(value)
+    except TypeError:  # one number of another kind
+        return _check_range("beta", value, 0.0)
+    return tuple(_check_range("beta", item, 0.0) for item in items)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,7 +112,7 @@ class View:
     Examples
     --------
     >>> View(front="-y", up="z").front
-    (-0.0, -1.0, -0.0)
+    (0.0, -1.0, 0.0)
     """
 
     front: Triple | str = (0.0, 0.0, 1.0)
@@ -115,7 +129,10 @@ class View:
             front[0] * up[1] - front[1] * up[0],
         )
         if cross <= 1e-9 * math.hypot(*front) * math.hypot(*up):
-            raise ParameterError(f"up must not be parallel to front. Got front={front} and up={up} instead.")
+            raise ParameterError(
+                f"up must not be parallel to front ({_words(front)}): give another up, for instance "
+                f"{'z' if abs(front[2]) < 0.9 else 'y'}."
+            )
         object.__setattr__(self, "front", front)
         object.__setattr__(self, "up", up)
         for name in ("viewpoint", "vanishing_point"):

@@ -12,11 +12,12 @@ import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
-from o3d_relief.errors import MeshError
+from o3d_relief.errors import MeshError, ParameterError
 from o3d_relief.linalg.laplacian import cotangent_laplacian
+from o3d_relief.output import trimmed_mesh
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.records import StageRecord, TrimStage
-from o3d_relief.scene.convert import mesh_arrays, trimmed_mesh
+from o3d_relief.scene.convert import mesh_arrays
 from o3d_relief.steps import (
     attenuation_step,
     clusters_step,
@@ -38,7 +39,7 @@ OnStage = Callable[[StageRecord], None]
 _Record = TypeVar("_Record", bound=StageRecord)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Relief:
     """A high relief and how it came about.
 
@@ -62,6 +63,17 @@ class Relief:
     stages: Mapping[str, StageRecord]
     params: ReliefParams
     view: View
+
+    def __post_init__(self) -> None:
+        self.to_scene.flags.writeable = False
+        self.source_index.flags.writeable = False
+
+    def __repr__(self) -> str:
+        depth = float(np.asarray(self.mesh.vertices)[:, 2].max())
+        return (
+            f"<Relief: {len(self.mesh.vertices)} vertices, {len(self.mesh.triangles)} triangles, "
+            f"{depth:.4g} deep, stages {', '.join(self.stages)}>"
+        )
 
     def report(self) -> dict[str, Any]:
         """Sum the relief up in plain values, for JSON.
@@ -154,8 +166,11 @@ def make_relief(
     >>> list(relief.stages)[:3]
     ['scene', 'perspective', 'visibility']
     """
-    params = params or ReliefParams()
-    view = view or View()
+    params = ReliefParams() if params is None else params
+    view = View() if view is None else view
+    for name, value, kind in (("params", params, ReliefParams), ("view", view, View)):
+        if not isinstance(value, kind):
+            raise ParameterError(f"{name} must be a {kind.__name__}. Got {value!r} instead.")
     journal = _Journal(on_stage)
 
     in_vertices, in_faces = mesh_arrays(mesh)

@@ -7,10 +7,10 @@ clusters, p <= k of attenuation points, n_in of input vertices.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from types import MappingProxyType
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,7 @@ __all__ = [
 ]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class StageRecord:
     """What every stage tells: its wall time and the counts of what it had to settle.
 
@@ -53,10 +53,23 @@ class StageRecord:
         for item in fields(self):
             value = getattr(self, item.name)
             if isinstance(value, np.ndarray):
-                value.flags.writeable = False
+                frozen = value.view()  # the caller's own array stays as it is
+                frozen.flags.writeable = False
+                object.__setattr__(self, item.name, frozen)
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self.seconds:.3f} s, {dict(self.counts)}>"
+
+    def __reduce__(self) -> tuple[Callable[..., StageRecord], tuple[type[StageRecord], dict[str, Any]]]:
+        values = {item.name: getattr(self, item.name) for item in fields(self)}
+        return _restored, (type(self), values | {"counts": dict(self.counts)})
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+def _restored(kind: type[StageRecord], values: dict[str, Any]) -> StageRecord:
+    return kind(**values)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class SceneStage(StageRecord):
     """The scene, welded, in the relief frame.
 
@@ -79,7 +92,7 @@ class SceneStage(StageRecord):
     unit: float
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class PerspectiveStage(StageRecord):
     """The scene after the forced perspective (Appendix II).
 
@@ -93,7 +106,7 @@ class PerspectiveStage(StageRecord):
     vertices: NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class VisibilityStage(StageRecord):
     """What is seen from the viewpoint u.
 
@@ -106,7 +119,7 @@ class VisibilityStage(StageRecord):
     visible: NDArray[np.bool_]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ClustersStage(StageRecord):
     """The k-means partition of the vertices on x and y.
 
@@ -122,7 +135,7 @@ class ClustersStage(StageRecord):
     centers: NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class AttenuationStage(StageRecord):
     """The attenuation points and what becomes of them (Eqs. 1-5).
 
@@ -167,7 +180,7 @@ class AttenuationStage(StageRecord):
         return np.asarray(self.new_height[self.action != "discard"])
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ConstructionStage(StageRecord):
     """The surface rebuilt from its differential coordinates (Eqs. 6-7).
 
@@ -180,7 +193,7 @@ class ConstructionStage(StageRecord):
     z: NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class RestorationStage(StageRecord):
     """Local depth order errors and their repair (Eq. 8, Appendix VI).
 
@@ -199,7 +212,7 @@ class RestorationStage(StageRecord):
     z: NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class OrderStage(StageRecord):
     """Everything in order along the viewing direction, beyond the paper.
 
@@ -213,7 +226,7 @@ class OrderStage(StageRecord):
     z: NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class CompressionStage(StageRecord):
     """The range compression (section 3.3).
 
@@ -229,7 +242,7 @@ class CompressionStage(StageRecord):
     z: NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class TrimStage(StageRecord):
     """The cut at the relief plane; its counts say what was kept."""
 

@@ -7,6 +7,7 @@ from typing import cast
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
 
 from o3d_relief.bounds.order import keep_order
 from o3d_relief.bounds.pairs import Pairs, grid_pairs, vertex_pairs
@@ -42,6 +43,7 @@ from o3d_relief.stages.construction import construct
 from o3d_relief.stages.perspective import forced_perspective
 from o3d_relief.stages.restoration import (
     cluster_radii,
+    lift_loose,
     lifting_discs,
     order_errors,
     restore,
@@ -75,7 +77,7 @@ def scene_step(
     if params.k > len(welded.vertices):
         raise ParameterError(
             f"k must be at most the number of vertices, {len(welded.vertices)} after welding. "
-            f"Got {params.k} instead."
+            f"Got {params.k} instead: give a smaller k."
         )
     return SceneStage(
         vertices=welded.vertices,
@@ -168,7 +170,7 @@ def attenuation_step(
 
 
 def _behind(z: NDArray[np.float64], visible: NDArray[np.bool_]) -> int:
-    return int((z[visible] < -_ON_PLANE).sum())
+    return int((z[visible] < 0.0).sum())
 
 
 def stacked_pairs(
@@ -234,7 +236,10 @@ def restoration_step(
     params: ReliefParams,
 ) -> RestorationStage:
     """Find order errors and pimples, and what is visible behind S, and mend them."""
+    _, label = connected_components(laplacian, directed=False)
     index = points.kept_index
+    if params.in_front:
+        z = lift_loose(z, label, index, visible)
     own_cluster = clusters.labels[index]
     radii = cluster_radii(vertices[:, :2], clusters.labels, len(clusters.centers))[own_cluster]
     error = order_errors(vertices, z, index, radii)
@@ -243,13 +248,14 @@ def restoration_step(
     if params.smooth_points:
         high |= smoothing_discs(vertices, index, radii)
     if params.in_front:
-        high |= lifting_discs(vertices, z, visible)
+        high |= lifting_discs(vertices, z, label, visible)
     bounded = visible if params.in_front else None
-    restored = restore(vertices, laplacian, z, high, index, blend=params.blend, in_front=bounded)
+    restored = restore(vertices, laplacian, z, high, index, label, blend=params.blend, in_front=bounded)
     counts |= {
         "solved": int(restored.solved.sum()),
         "points_held": restored.points_held,
         "set_on_plane": restored.set_on_plane,
+        "rounds": restored.rounds,
         "visible_behind": _behind(restored.z, visible),
     }
     return RestorationStage(order_error=error, solved=restored.solved, z=restored.z, counts=counts)
@@ -267,7 +273,7 @@ def order_step(
 ) -> OrderStage:
     """Keep everything in order along the viewing direction."""
     if pairs is None:
-        return OrderStage(z=z)
+        return OrderStage(z=_on_plane(z))
     # The compression comes later and shrinks gaps, at most by its smallest ratio.
     ratio, lowest = _ratios(z, params, unit)
     min_gap = params.min_gap / unit / (0.95 * lowest if ratio < 1.0 else 1.0)
@@ -276,7 +282,7 @@ def order_step(
         laplacian,
         vertex_areas(vertices, faces),
         z,
-        [pairs, grid_pairs(vertices, faces)],
+        Pairs.join([pairs, grid_pairs(vertices, faces)]),
         in_front=visible if params.in_front else None,
         min_gap=min_gap,
     )
@@ -286,7 +292,12 @@ def order_step(
         "left": ordered.left,
         "visible_behind": _behind(ordered.z, visible),
     }
-    return OrderStage(z=ordered.z, counts=counts)
+    return OrderStage(z=_on_plane(ordered.z), counts=counts)
+
+
+def _on_plane(z: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Set onto S what lies within rounding errors of it."""
+    return np.where(np.abs(z) < _ON_PLANE, 0.0, z)
 
 
 def _ratios(z: NDArray[np.float64], params: ReliefParams, unit: float) -> tuple[float, float]:
@@ -325,5 +336,5 @@ def trim_step(
     welded = scene.welded_index[usable]
     moved = to_relief_units(in_vertices, frame)
     moved[usable, :2] += (vertices - scene.vertices)[welded, :2]
-    moved[usable, 2] = np.where(np.abs(z) < _ON_PLANE, 0.0, z)[welded]
+    moved[usable, 2] = z[welded]
     return trim_behind(moved * frame.unit, in_faces, usable)

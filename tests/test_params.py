@@ -9,7 +9,7 @@ from o3d_relief import ParameterError, ReliefParams, View
 @pytest.mark.parametrize(
     ("values", "words"),
     [
-        ({"k": 0}, "k must be between 1 and"),
+        ({"k": 0}, "k must be at least 1"),
         ({"k": 2.5}, "k must be a whole number"),
         ({"k": "many"}, "k must be a number"),
         ({"k": True}, "k must be a number"),
@@ -26,8 +26,12 @@ from o3d_relief import ParameterError, ReliefParams, View
         ({"depth": 0}, "depth must be greater than 0"),
         ({"depth": float("inf")}, "depth must be finite"),
         ({"smooth_points": 1}, "smooth_points must be True or False"),
+        ({"k": 10**400}, "k must be a number"),
+        ({"k": "5"}, "k must be a number"),
+        ({"min_gap": -1}, "min_gap must be at least 0"),
+        ({"min_gap": 1, "in_order": False}, "min_gap needs in_order"),
         ({"in_front": None}, "in_front must be True or False"),
-        ({"seed": -1}, "seed must be between 0"),
+        ({"seed": -1}, "seed must be at least 0"),
     ],
 )
 def test_wrong_parameters_are_named(values, words):
@@ -42,6 +46,7 @@ def test_wrong_parameters_are_named(values, words):
         ({"front": "--x"}, "front must be x, -x"),
         ({"front": (0, 0, 0)}, "front must not be the zero vector"),
         ({"front": (0, 1)}, "front must be three numbers"),
+        ({"front": np.array(1.0)}, "front must be three numbers"),
         ({"front": "y"}, "up must not be parallel to front"),
         ({"up": (0, float("nan"), 1)}, "up must be finite"),
         ({"viewpoint": (1, 2)}, "viewpoint must be three numbers"),
@@ -64,6 +69,8 @@ def test_numpy_values_are_taken_as_plain_numbers():
     assert params.k == 7
     assert isinstance(params.k, int)
     assert params.beta == (0.1, 0.3)
+    assert ReliefParams(beta=np.array(0.4)).beta == 0.4
+    assert View(front=(0, 0, 1e-200)).front == View(front=(0, 0, 1e200)).front == (0.0, 0.0, 1.0)
 
 
 def test_parameters_cannot_be_changed():

@@ -1,10 +1,17 @@
+import copy
 import json
+import os
+import pickle
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import open3d as o3d
 import pytest
 
 import o3d_relief as rel
+from o3d_relief.records import VisibilityStage
 from shapes import bust, exploded, grid, hills, joined, moved, sphere, to_mesh, turn
 
 STAGES = [
@@ -47,6 +54,27 @@ def test_stages_are_all_there_in_order_timed_and_read_only(relief):
                     value[...] = 0
     with pytest.raises(TypeError):
         relief.stages["scene"].counts["faces"] = 0
+
+
+def test_arrays_of_the_relief_are_read_only(relief):
+    for value in (relief.to_scene, relief.source_index):
+        with pytest.raises(ValueError, match="read-only"):
+            value[...] = 0
+
+
+def test_records_survive_pickling_and_copying_and_leave_their_source_alone(relief):
+    for record in relief.stages.values():
+        for again in (pickle.loads(pickle.dumps(record)), copy.deepcopy(record)):
+            assert type(again) is type(record)
+            assert again.counts == record.counts
+    visible = np.ones(3, dtype=bool)
+    VisibilityStage(visible=visible)
+    visible[0] = False
+
+
+def test_short_words_for_long_things(relief):
+    assert len(repr(relief)) < 250
+    assert all(len(repr(record)) < 400 for record in relief.stages.values())
 
 
 def test_callback_gets_each_record_as_it_is_done(mesh):
@@ -153,15 +181,34 @@ def test_moved_turned_and_scaled_scene_gives_the_same_relief(relief, scale):
     assert (back @ rotation)[:, 1] == pytest.approx(there_y, abs=1e-9 * scale * 1000)
 
 
-def test_same_seed_same_bytes_whatever_the_number_of_threads(mesh, relief):
-    threads = o3d.utility.get_max_threads()
-    o3d.utility.set_max_threads(1)
-    try:
-        again = rel.make_relief(mesh, PARAMS)
-    finally:
-        o3d.utility.set_max_threads(threads)
-    assert np.asarray(again.mesh.vertices).tobytes() == np.asarray(relief.mesh.vertices).tobytes()
-    assert np.asarray(again.mesh.triangles).tobytes() == np.asarray(relief.mesh.triangles).tobytes()
+_HASH = """
+import hashlib, sys
+sys.path.insert(0, sys.argv[1])
+import numpy as np, open3d as o3d, o3d_relief as rel
+from shapes import bust, to_mesh
+o3d.utility.set_max_threads(int(sys.argv[2]))
+mesh = rel.make_relief(to_mesh(bust(72)), rel.ReliefParams(k=24)).mesh
+print(hashlib.sha256(np.asarray(mesh.vertices).tobytes() + np.asarray(mesh.triangles).tobytes()).hexdigest())
+"""
+
+
+def test_same_seed_same_bytes_whatever_the_number_of_threads():
+    found = set()
+    for threads in ("1", "2", "3"):
+        names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+        done = subprocess.run(
+            [sys.executable, "-c", _HASH, str(Path(__file__).parent), threads],
+            env=os.environ | dict.fromkeys(names, threads),
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        found.add(done.stdout)
+    assert len(found) == 1
+
+
+def test_another_seed_gives_another_relief(mesh, relief):
     other = rel.make_relief(mesh, rel.ReliefParams(k=24, seed=1))
     assert np.asarray(other.mesh.vertices).tobytes() != np.asarray(relief.mesh.vertices).tobytes()
 
@@ -291,6 +338,41 @@ def test_attributes_survive_the_weld_and_the_cut():
     assert [np.asarray(image).tolist() for image in out.textures] == [p.tolist() for p in pictures]
 
 
+def test_textures_of_open3d_s_own_reader_survive():
+    mesh = to_mesh(bust(24))
+    uvs = np.asarray(mesh.vertices)[np.asarray(mesh.triangles)].reshape(-1, 3)[:, :2] / 100 + 0.5
+    mesh.triangle_uvs = o3d.utility.Vector2dVector(uvs)
+    picture = np.full((4, 4, 3), 90, dtype=np.uint8)
+    mesh.textures = [o3d.geometry.Image(), o3d.geometry.Image(picture)]  # the first material has none
+    textures = rel.make_relief(mesh, PARAMS).mesh.textures
+    assert textures[0].is_empty()
+    assert np.array_equal(np.asarray(textures[1]), picture)
+
+
+def test_normals_do_not_show_the_seams():
+    vertices, faces = sphere(40)
+    relief = rel.make_relief(to_mesh(exploded((vertices, faces))), PARAMS)
+    out, normals = np.asarray(relief.mesh.vertices), np.asarray(relief.mesh.vertex_normals)
+    assert np.linalg.norm(normals, axis=1) == pytest.approx(1.0)
+    _, place = np.unique(out, axis=0, return_inverse=True)
+    inner = out[:, 2] > 5.0
+    for axis in range(3):
+        spread = np.zeros(place.max() + 1)
+        np.maximum.at(spread, place[inner], normals[inner, axis])
+        low = np.full(place.max() + 1, np.inf)
+        np.minimum.at(low, place[inner], normals[inner, axis])
+        used = np.isfinite(low)
+        assert (np.maximum(spread, 0) - np.maximum(low, 0))[used].max() < 1e-9
+
+
+def test_edges_of_a_box_stay_sharp():
+    box = o3d.geometry.TriangleMesh.create_box(4, 4, 1)
+    corners = exploded((np.asarray(box.vertices), np.asarray(box.triangles, dtype=np.int64)))
+    relief = rel.make_relief(to_mesh(corners), rel.ReliefParams.paper(k=1, attach_below=0))
+    normals = np.asarray(relief.mesh.vertex_normals)
+    assert np.abs(normals).max(axis=1) == pytest.approx(1.0)
+
+
 def _broken(change):
     vertices, faces = hills(9)
     return to_mesh(change(vertices, faces))
@@ -322,6 +404,12 @@ def _with_value(value):
 def test_meshes_that_make_no_relief(mesh, words):
     with pytest.raises(rel.MeshError, match=words):
         rel.make_relief(mesh, rel.ReliefParams(k=4))
+
+
+@pytest.mark.parametrize("words", [{"params": {"k": 4}}, {"view": (0, 0, 1)}, {"params": rel.View()}])
+def test_wrong_kinds_of_arguments(words):
+    with pytest.raises(rel.ParameterError, match="must be a"):
+        rel.make_relief(to_mesh(hills()), **words)
 
 
 @pytest.mark.parametrize(

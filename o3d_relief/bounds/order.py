@@ -14,16 +14,20 @@ from o3d_relief.linalg.solve import solve_spd
 
 __all__ = ["Ordered", "keep_order", "out_of_order"]
 
-_REACH = 8.0
-"""Distance in relief units over which a correction fades out."""
+_REACH = 4.0
+"""Distance over which a correction fades out, in multiples of its size: slopes change by a quarter."""
+
+_SHORTEST, _LONGEST = 1.5, 8.0
+"""The same in relief units, at least and at most."""
 
 _REGION = 3.0
 """What lies further from every correction than this many reaches is not touched."""
 
 _MARGIN = 0.2
-_FIRST_WEIGHT = 1.0
+_FIRST_STIFFNESS = 10.0
 _GROWTH = 4.0
-_ROUNDS = 24
+_STIFFEST = 1e5
+_ROUNDS = 30
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -77,7 +81,7 @@ def keep_order(
     laplacian: sp.csr_array,
     areas: NDArray[np.float64],
     z: NDArray[np.float64],
-    pair_sets: list[Pairs],
+    pairs: Pairs,
     *,
     in_front: NDArray[np.bool_] | None = None,
     min_gap: float = 0.0,
@@ -86,8 +90,9 @@ def keep_order(
 
     minimise  e' C e + sum of A_i e_i^2 / reach^2   subject to  gap + R (z + e - z_0) >= required gap
     for every pair, and z_i + e_i >= 0 for the vertices in front. The original scene fulfils every
-    constraint, so there is always a solution. Each constraint that is violated becomes a spring that pulls
-    to a little beyond its bound, and a spring whose constraint is still violated gets four times as stiff.
+    constraint, so there is always a solution. Each constraint that is violated becomes a one-sided spring
+    that pulls to a little beyond its bound; one that is still violated gets stiffer and aims further (the
+    method of multipliers).
 
     Parameters
     ----------
@@ -99,8 +104,7 @@ def keep_order(
         Area of each vertex.
     z : (n,) float64
         Heights to correct.
-    pair_sets : list of Pairs
-        Kept in order one after the other: the later ones count once the earlier ones are in order.
+    pairs : Pairs
     in_front : (n,) bool, optional
         Vertices that must not end behind S.
     min_gap : float
@@ -112,31 +116,58 @@ def keep_order(
     """
     front = np.zeros(len(z), dtype=bool) if in_front is None else in_front
     system = _Springs(laplacian, areas, vertices)
+    on_pairs, on_floor = _Multipliers(len(pairs)), _Multipliers(len(z))
+    wanted, wanted_height = _wanted_gaps(pairs, min_gap), np.full(len(z), _MARGIN / 10)
     current, rounds = z, 0
-    active: list[Pairs] = []
-    stiffness: list[NDArray[np.float64]] = []
-    floor = np.zeros(len(z))
-    for number, pairs in enumerate(pair_sets):
-        active.append(pairs.select(np.zeros(len(pairs), dtype=bool)))
-        stiffness.append(np.zeros(len(pairs)))
-        while rounds < _ROUNDS:
-            worst = False
-            for k in range(number + 1):
-                bad = out_of_order(pair_sets[k], current, min_gap=min_gap)
-                stiffness[k] = np.where(bad, np.maximum(stiffness[k] * _GROWTH, _FIRST_WEIGHT), stiffness[k])
-                worst |= bool(bad.any())
-            behind = front & (current < 0.0)
-            floor = np.where(behind, np.maximum(floor * _GROWTH, _FIRST_WEIGHT), floor)
-            if not worst and not behind.any():
-                break
-            chosen = Pairs.join([pair_sets[k].select(stiffness[k] > 0) for k in range(number + 1)])
-            weights = np.concatenate([stiffness[k][stiffness[k] > 0] for k in range(number + 1)])
-            current = system.solve(z, chosen, weights, floor, min_gap)
-            rounds += 1
-    left = sum(int(out_of_order(pairs, current, min_gap=min_gap).sum()) for pairs in pair_sets)
-    left += int((front & (current < 0.0)).sum())
-    corrected = sum(int((s > 0).sum()) for s in stiffness)
+    while True:
+        wrong = out_of_order(pairs, current, min_gap=min_gap)
+        behind = front & (current < 0.0)
+        left = int(wrong.sum()) + int(behind.sum())
+        if left == 0 or rounds == _ROUNDS:
+            break
+        upper, lower = pairs.heights(current)
+        springs = on_pairs.update(wrong, wanted - (upper - lower))
+        lifts = on_floor.update(behind, wanted_height - current)
+        current = system.solve(
+            z,
+            pairs.select(springs),
+            on_pairs.stiffness[springs],
+            (wanted + on_pairs.further)[springs],
+            np.where(lifts, on_floor.stiffness, 0.0),
+            wanted_height + on_floor.further,
+        )
+        rounds += 1
+    corrected = int((on_pairs.stiffness > 0.0).sum())
     return Ordered(z=current, rounds=rounds, corrected_pairs=corrected, left=left)
+
+
+class _Multipliers:
+    """The forces of one-sided springs: the method of multipliers (an augmented Lagrangian)."""
+
+    def __init__(self, count: int) -> None:
+        self.stiffness = np.zeros(count)
+        self.force = np.zeros(count)
+
+    def update(self, wrong: NDArray[np.bool_], missing: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return which springs act next, given what is wrong and what each lacks of what is wanted.
+
+        What a spring could not hold is added to its force; one whose force would pull lets go; one that is
+        still wrong gets stiffer.
+        """
+        self.force = np.maximum(self.force + self.stiffness * missing, 0.0)
+        self.stiffness[wrong] = np.clip(self.stiffness[wrong] * _GROWTH, _FIRST_STIFFNESS, _STIFFEST)
+        return (self.stiffness > 0.0) & ((self.force > 0.0) | (missing > 0.0))
+
+    @property
+    def further(self) -> NDArray[np.float64]:
+        """How far beyond what is wanted each spring aims."""
+        return self.force / np.maximum(self.stiffness, _FIRST_STIFFNESS)
+
+
+def _wanted_gaps(pairs: Pairs, min_gap: float) -> NDArray[np.float64]:
+    """Return the gap that a spring pulls to: a little more than it must keep, and less than it was."""
+    required = required_gaps(pairs, min_gap)
+    return np.asarray(required + np.minimum((pairs.gap - required) / 4.0, _MARGIN))
 
 
 class _Springs:
@@ -145,29 +176,51 @@ class _Springs:
     def __init__(
         self, laplacian: sp.csr_array, areas: NDArray[np.float64], vertices: NDArray[np.float64]
     ) -> None:
-        self._form = (laplacian + sp.diags_array(areas / _REACH**2)).tocsr()
+        self._laplacian = laplacian
+        self._areas = areas
         self._vertices = vertices
+        self._size = np.zeros(len(vertices))
 
     def solve(
         self,
         z: NDArray[np.float64],
         pairs: Pairs,
         weights: NDArray[np.float64],
+        target: NDArray[np.float64],
         floor: NDArray[np.float64],
-        min_gap: float,
+        floor_target: NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        required = required_gaps(pairs, min_gap)
-        target = required + np.minimum((pairs.gap - required) / 4.0, _MARGIN)
         upper, lower = pairs.heights(z)
-        rows = pairs.difference(len(z))
-        pull: NDArray[np.float64] = rows.T @ (weights * (target - (upper - lower)))
-        pull = pull + floor * (np.minimum(self._vertices[:, 2], _MARGIN / 10) - z)
-        touched = np.unique(np.concatenate([pairs.upper.ravel(), pairs.lower.ravel(), np.flatnonzero(floor)]))
-        distance, _ = cKDTree(self._vertices[touched]).query(
-            self._vertices, distance_upper_bound=_REGION * _REACH
-        )
-        free = np.flatnonzero(np.isfinite(distance))
-        matrix = (self._form + rows.T @ sp.diags_array(weights) @ rows + sp.diags_array(floor)).tocsr()
-        result = z.copy()
-        result[free] += solve_spd(matrix[free][:, free].tocsr(), np.asarray(pull)[free], tolerance=1e-7)
+        missing = target - (upper - lower)
+        lift = np.where(floor > 0.0, floor_target - z, 0.0)
+        free, reach = self._region(pairs, missing, lift)
+
+        rows = pairs.difference(len(z))[:, free]
+        pull = rows.T @ (weights * missing) + floor[free] * lift[free]
+        form = self._laplacian[free][:, free] + rows.T @ sp.diags_array(weights) @ rows
+        form = form + sp.diags_array(self._areas[free] / reach**2 + floor[free])
+        result: NDArray[np.float64] = z.copy()
+        result[free] += solve_spd(form.tocsr(), np.asarray(pull), tolerance=1e-7)
         return result
+
+    def _region(
+        self,
+        pairs: Pairs,
+        missing: NDArray[np.float64],
+        lift: NDArray[np.float64],
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Return the vertices that a correction may move, and how far it reaches at each of them.
+
+        Both only grow from round to round, or the multipliers would chase a moving target.
+        """
+        for corners in (pairs.upper, pairs.lower):
+            np.maximum.at(self._size, corners.ravel(), np.repeat(missing, 3))
+        self._size = np.maximum(self._size, lift)
+        touched = np.flatnonzero(self._size > 0.0)
+        distance, nearest = cKDTree(self._vertices[touched]).query(
+            self._vertices, distance_upper_bound=_REGION * _LONGEST
+        )
+        near = np.flatnonzero(np.isfinite(distance))
+        reach = np.clip(_REACH * self._size[touched][nearest[near]], _SHORTEST, _LONGEST)
+        inside = distance[near] <= _REGION * reach
+        return near[inside], reach[inside]

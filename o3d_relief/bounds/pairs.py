@@ -13,6 +13,7 @@ import numpy as np
 import open3d as o3d
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 __all__ = ["Pairs", "grid_pairs", "touching_pairs", "vertex_pairs"]
 
@@ -160,14 +161,22 @@ def grid_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64], *, side:
     x, y = np.meshgrid(low[0] + steps * (high[0] - low[0]), low[1] + steps * (high[1] - low[1]))
     start = np.stack([x.ravel(), y.ravel(), np.full(side * side, low[2] - 0.01 * box.size)], axis=1)
     hits = box.scene.list_intersections(box.rays(start, _UP))
-    triangle = faces[hits["primitive_ids"].numpy().astype(np.int64)]
-    weights = _weights(hits["primitive_uvs"].numpy())
     line = hits["ray_ids"].numpy().astype(np.int64)
-    height = np.einsum("pc,pc->p", vertices[:, 2][triangle], weights)
-    order = np.lexsort((height, line))
-    following = np.flatnonzero(line[order][1:] == line[order][:-1])
+    t = hits["t_hit"].numpy().astype(np.float64)
+    # One sort by line and height on it: t is well below the factor's size, and float64 has room for both.
+    order = np.argsort(line + t / (4.0 * max(float(t.max(initial=0.0)), 1.0)), kind="stable")
+    line, t = line[order], t[order]
+    following = np.flatnonzero((line[1:] == line[:-1]) & ((t[1:] - t[:-1]) * box.size > _SAME_PLACE))
     lower, upper = order[following], order[following + 1]
-    return _pairs(vertices[:, 2], triangle[upper], weights[upper], triangle[lower], weights[lower])
+    triangle = hits["primitive_ids"].numpy()
+    uv = hits["primitive_uvs"].numpy()
+    return _pairs(
+        vertices[:, 2],
+        faces[triangle[upper].astype(np.int64)],
+        _weights(uv[upper]),
+        faces[triangle[lower].astype(np.int64)],
+        _weights(uv[lower]),
+    )
 
 
 def touching_pairs(
@@ -190,11 +199,12 @@ def touching_pairs(
         The vertices above, whichever way the other surface lies; the gap counts along the axis.
     """
     box = _UnitBox(vertices, faces)
+    candidates = _near_other_parts(vertices, label, reach)
     found = []
     for axis in np.eye(3):
-        hits = box.scene.list_intersections(box.rays(vertices - reach * axis, axis))
+        hits = box.scene.list_intersections(box.rays(vertices[candidates] - reach * axis, axis))
         off = hits["t_hit"].numpy().astype(np.float64) * box.size - reach
-        vertex = hits["ray_ids"].numpy().astype(np.int64)
+        vertex = candidates[hits["ray_ids"].numpy().astype(np.int64)]
         other = faces[hits["primitive_ids"].numpy().astype(np.int64)]
         near = (np.abs(off) <= reach) & (label[vertex] != label[other[:, 0]])
         own, own_weights = _corners(vertex[near])
@@ -208,6 +218,28 @@ def touching_pairs(
             )
         )
     return Pairs.join(found)
+
+
+def _near_other_parts(
+    vertices: NDArray[np.float64], label: NDArray[np.int32], reach: float
+) -> NDArray[np.int64]:
+    """Return the vertices that may touch another part: not those of the largest part far from all others."""
+    largest = np.bincount(label).argmax()
+    others = np.flatnonzero(label != largest)
+    own = np.flatnonzero(label == largest)
+    if len(others) == 0:
+        return others
+    low = np.full((label.max() + 1, 3), np.inf)
+    high = np.full((label.max() + 1, 3), -np.inf)
+    np.minimum.at(low, label[others], vertices[others])
+    np.maximum.at(high, label[others], vertices[others])
+    part = np.unique(label[others])
+    centre, half = (low[part] + high[part]) / 2, (high[part] - low[part]) / 2
+    around = cKDTree(vertices[own]).query_ball_point(centre, np.linalg.norm(half, axis=1) + 2.0 * reach)
+    near = np.zeros(len(own), dtype=bool)
+    for members in around:
+        near[members] = True
+    return np.sort(np.concatenate([others, own[near]]))
 
 
 def _corners(vertices: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

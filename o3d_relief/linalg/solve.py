@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from o3d_relief.errors import SolverError
 
-__all__ = ["solve_spd"]
+__all__ = ["solve_direct", "solve_spd"]
 
 _DIRECT_UP_TO = 4000
 _MAX_ITERATIONS = 1000
@@ -50,7 +50,7 @@ def solve_spd(
     Raises
     ------
     SolverError
-        The relative residual is above 1e-8.
+        The matrix is singular, or the relative residual is above 1e-8 and ten times the tolerance.
 
     Examples
     --------
@@ -62,7 +62,7 @@ def solve_spd(
         return np.zeros(n)
     with threadpool_limits(limits=1):
         if n <= _DIRECT_UP_TO:
-            solution = sla.splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A").solve(right_hand_side)
+            solution = solve_direct(matrix, right_hand_side)
         else:
             solution = _multigrid(matrix, right_hand_side, matrix if similar is None else similar, tolerance)
         residual = np.linalg.norm(matrix @ solution - right_hand_side)
@@ -73,6 +73,32 @@ def solve_spd(
             "the mesh is likely broken near very thin triangles: repair or remesh it."
         )
     return np.asarray(solution, dtype=np.float64)
+
+
+def solve_direct(matrix: sp.csr_array, right_hand_side: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Solve A x = b for a sparse A of any condition, by an LU factorisation.
+
+    Parameters
+    ----------
+    matrix : (n, n) sparse float64
+    right_hand_side : (n,) float64
+
+    Returns
+    -------
+    (n,) float64
+
+    Raises
+    ------
+    SolverError
+        The matrix is singular.
+    """
+    if len(right_hand_side) == 0:
+        return np.zeros(0)
+    try:
+        factor = sla.splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A")
+    except RuntimeError as error:  # SuperLU: exactly singular
+        raise SolverError(f"A linear system of {len(right_hand_side)} unknowns is singular.") from error
+    return np.asarray(factor.solve(right_hand_side), dtype=np.float64)
 
 
 def _multigrid(

@@ -1,4 +1,4 @@
-"""Open3D meshes to arrays and back: the border at which meshes are checked once."""
+"""Open3D meshes to arrays: the border at which meshes are checked once."""
 
 from __future__ import annotations
 
@@ -8,9 +8,7 @@ from numpy.typing import NDArray
 
 from o3d_relief.errors import MeshError
 
-__all__ = ["mesh_arrays", "trimmed_mesh"]
-
-from o3d_relief.stages.trim import Trimmed
+__all__ = ["mesh_arrays"]
 
 
 def mesh_arrays(mesh: o3d.geometry.TriangleMesh) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -33,9 +31,8 @@ def mesh_arrays(mesh: o3d.geometry.TriangleMesh) -> tuple[NDArray[np.float64], N
         out of range.
     """
     if not isinstance(mesh, o3d.geometry.TriangleMesh):
-        raise MeshError(
-            f"The scene must be an open3d.geometry.TriangleMesh. Got {type(mesh).__name__} instead."
-        )
+        kind = f"{type(mesh).__module__}.{type(mesh).__qualname__}"
+        raise MeshError(f"The scene must be an open3d.geometry.TriangleMesh. Got a {kind} instead.")
     vertices = np.array(mesh.vertices, dtype=np.float64).reshape(-1, 3)
     faces = np.array(mesh.triangles, dtype=np.int64).reshape(-1, 3)
     if len(vertices) == 0:
@@ -51,42 +48,8 @@ def mesh_arrays(mesh: o3d.geometry.TriangleMesh) -> tuple[NDArray[np.float64], N
         )
     bad = int((~np.isfinite(vertices[faces]).all(axis=(1, 2))).sum())
     if bad:
-        raise MeshError(f"{bad} triangles have vertices that are not finite numbers: remove them first.")
+        raise MeshError(
+            f"The mesh has vertices that are not finite numbers, in {bad} of its {len(faces)} triangles: "
+            "remove these first."
+        )
     return vertices, faces
-
-
-def trimmed_mesh(mesh: o3d.geometry.TriangleMesh, trimmed: Trimmed) -> o3d.geometry.TriangleMesh:
-    """Build the output mesh and carry the input's attributes over to it.
-
-    Vertex colours and triangle UVs are interpolated along the cut, textures and material ids kept, and
-    vertex normals computed anew.
-
-    Parameters
-    ----------
-    mesh : open3d.geometry.TriangleMesh
-        The input, whose vertex and triangle numbers `trimmed` refers to.
-    trimmed : Trimmed
-
-    Returns
-    -------
-    open3d.geometry.TriangleMesh
-    """
-    result = o3d.geometry.TriangleMesh(
-        o3d.utility.Vector3dVector(trimmed.vertices),
-        o3d.utility.Vector3iVector(trimmed.faces.astype(np.int32)),
-    )
-    faces = np.asarray(mesh.triangles, dtype=np.int64)
-    if mesh.has_vertex_colors():
-        colors = trimmed.to_vertices(np.asarray(mesh.vertex_colors))
-        result.vertex_colors = o3d.utility.Vector3dVector(colors)
-    if mesh.has_triangle_uvs():
-        uvs = trimmed.to_corners(faces, np.asarray(mesh.triangle_uvs).reshape(-1, 3, 2))
-        result.triangle_uvs = o3d.utility.Vector2dVector(uvs.reshape(-1, 2))
-    if mesh.has_triangle_material_ids():
-        ids = np.asarray(mesh.triangle_material_ids)[trimmed.face_from]
-        result.triangle_material_ids = o3d.utility.IntVector(ids.astype(np.int32))
-    if mesh.has_textures():
-        # Copies: an Image of the list lives only as long as its mesh.
-        result.textures = [o3d.geometry.Image(np.array(image)) for image in mesh.textures]
-    result.compute_vertex_normals()
-    return result

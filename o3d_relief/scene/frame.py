@@ -21,6 +21,9 @@ A scene that is moved, turned and scaled differs by rounding errors only. On the
 vanish, so that every decision (what is visible, which cluster, which point) is the same.
 """
 
+_EDGE_ON = 1e-9
+"""Scenes narrower than this share of their size are lines."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Frame:
@@ -55,6 +58,12 @@ def _axes(front: tuple[float, float, float], up: tuple[float, float, float]) -> 
     x = np.cross(np.asarray(up, dtype=np.float64), z)
     x = x / np.linalg.norm(x)
     return np.stack([x, np.cross(z, x), z])
+
+
+def _width(across: NDArray[np.float64]) -> float:
+    """Return how far points (n, 2) spread across the line that fits them best, per point."""
+    spread = np.linalg.qr(across - across.mean(axis=0), mode="r")
+    return float(np.linalg.svd(spread, compute_uv=False).min() / np.sqrt(len(across)))
 
 
 def relief_frame(
@@ -94,13 +103,11 @@ def relief_frame(
     turned = (vertices - middle) @ rotation.T
     low, high = turned.min(axis=0), turned.max(axis=0)
     unit = float((high - low)[:2].max()) / RELIEF_UNITS
-    across = turned[:, :2] - turned[:, :2].mean(axis=0)
-    spread = np.linalg.eigvalsh(across.T @ across)
     size = float(np.abs(vertices - middle).max())
-    if unit * RELIEF_UNITS <= 1e-9 * size or spread[0] <= 1e-18 * spread[1]:
+    if size == 0.0 or _width(turned[:, :2] / size) <= _EDGE_ON:
         raise MeshError(
-            "The scene is seen edge-on: all its vertices lie on one line as seen from "
-            f"front={tuple(float(c) for c in front)}; choose another front."
+            "The scene is seen edge-on: all its vertices lie on one line as seen from the front "
+            f"({', '.join(f'{c:g}' for c in front)}): choose another front."
         )
     centre = (low + high) / 2
     origin = middle + rotation.T @ np.array([centre[0], centre[1], low[2]])

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Welded", "weld"]
+__all__ = ["Welded", "first_of_equal_rows", "weld"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -38,8 +38,18 @@ class Welded:
     duplicate_faces: int
 
 
-def _first_of_equal_rows(rows: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return for each row the number of the first row that equals it."""
+def first_of_equal_rows(rows: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Find for each row the first one that equals it.
+
+    Parameters
+    ----------
+    rows : (n, c) float64
+
+    Returns
+    -------
+    (n,) int64
+        Its own number for a row that equals none before it.
+    """
     order = np.lexsort(rows.T)  # stable: equal rows stay in input order
     ordered = rows[order]
     is_new = np.ones(len(rows), dtype=bool)
@@ -71,12 +81,12 @@ def weld(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Welded:
     >>> weld(v, np.array([[0, 1, 2], [3, 5, 4]])).index.tolist()
     [0, 1, 2, 1, 2, 3]
     """
-    first = _first_of_equal_rows(vertices)
+    first = first_of_equal_rows(vertices)
     merged = first[faces]
     a, b, c = merged.T
     whole = (a != b) & (b != c) & (c != a)
     candidates = merged[whole]
-    same = _first_of_equal_rows(np.sort(candidates, axis=1).astype(np.float64))
+    same = first_of_equal_rows(np.sort(candidates, axis=1).astype(np.float64))
     kept = candidates[same == np.arange(len(same))]
     used = np.zeros(len(vertices), dtype=bool)
     used[kept] = True

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -180,6 +180,7 @@ def save_stage_pictures(
     *,
     relief: o3d.geometry.TriangleMesh | None = None,
     size: tuple[int, int] = (1600, 800),
+    on_picture: Callable[[Path], None] | None = None,
 ) -> list[Path]:
     """Write a picture of each stage that has a record: 01_scene.png, 02_perspective.png, ...
 
@@ -192,6 +193,8 @@ def save_stage_pictures(
         The finished relief, in the relief frame.
     size : (width, height)
         In pixels.
+    on_picture : callable, optional
+        Called with each file as soon as it is written.
 
     Returns
     -------
@@ -211,4 +214,6 @@ def save_stage_pictures(
         if name in stages:
             paths.append(folder / f"{number:02d}_{name}.png")
             save_png(paths[-1], stage_picture(name, stages, relief=relief, size=size))
+            if on_picture is not None:
+                on_picture(paths[-1])
     return paths

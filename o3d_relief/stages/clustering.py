@@ -65,9 +65,9 @@ def _samples(xy: NDArray[np.float64], k: int) -> tuple[NDArray[np.float64], NDAr
         return in_order, np.ones(len(xy))
     low = xy.min(axis=0)
     step = float((xy.max(axis=0) - low).max()) / _CELLS
-    cell = np.minimum((xy - low) // step, _CELLS - 1).astype(np.int64) @ np.array([1, _CELLS])
+    cell = np.minimum((in_order - low) // step, _CELLS - 1).astype(np.int64) @ np.array([1, _CELLS])
     weights = np.bincount(cell, minlength=_CELLS**2).astype(np.float64)
-    sums = np.stack([np.bincount(cell, weights=c, minlength=_CELLS**2) for c in xy.T], axis=1)
+    sums = np.stack([np.bincount(cell, weights=c, minlength=_CELLS**2) for c in in_order.T], axis=1)
     full = weights > 0
     if full.sum() < _SAMPLES_PER_CLUSTER * k:
         return in_order, np.ones(len(xy))

@@ -9,6 +9,9 @@ from o3d_relief.errors import ParameterError
 
 __all__ = ["forced_perspective"]
 
+_NEAREST = 0.01
+"""Nearer than this to the vanishing point, in relief units, whole parts would shrink to a point."""
+
 
 def forced_perspective(
     vertices: NDArray[np.float64],
@@ -48,10 +51,10 @@ def forced_perspective(
     front = float(vertices[:, 2].max())
     u_z = front if view_plane is None else float(view_plane)
     g = np.asarray(vanishing_point, dtype=np.float64)
-    if g[2] >= min(0.0, float(vertices[:, 2].min())):
+    if g[2] > min(0.0, float(vertices[:, 2].min())) - _NEAREST:
         raise ParameterError(
-            "vanishing_point must lie behind the relief plane and the scene (z < 0). "
-            f"Got z = {g[2]:g} instead."
+            f"vanishing_point must lie behind the relief plane and the scene, by {_NEAREST:g} relief units "
+            f"at least. Got z = {g[2]:g} instead."
         )
     if u_z < front:
         raise ParameterError(

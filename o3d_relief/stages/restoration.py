@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import pdist
 
@@ -17,6 +16,7 @@ __all__ = [
     "Restoration",
     "cluster_radii",
     "depth_order_error",
+    "lift_loose",
     "lifting_discs",
     "order_errors",
     "restore",
@@ -50,12 +50,15 @@ class Restoration:
         Fixed points that stayed fixed because nothing else held their component.
     set_on_plane : int
         Vertices that were set onto S.
+    rounds : int
+        Linear systems solved.
     """
 
     z: NDArray[np.float64]
     solved: NDArray[np.bool_]
     points_held: int
     set_on_plane: int
+    rounds: int
 
 
 def cluster_radii(xy: NDArray[np.float64], labels: NDArray[np.int64], k: int) -> NDArray[np.float64]:
@@ -190,8 +193,39 @@ def smoothing_discs(
     return marked
 
 
+def lift_loose(
+    z: NDArray[np.float64],
+    label: NDArray[np.int32],
+    index: NDArray[np.int64],
+    visible: NDArray[np.bool_],
+) -> NDArray[np.float64]:
+    """Lift each component without a fixed point as a whole until nothing visible of it lies behind S.
+
+    Parameters
+    ----------
+    z : (n,) float64
+        Heights after the construction.
+    label : (n,) int
+        Connected component of each vertex.
+    index : (q,) int64
+        The fixed points.
+    visible : (n,) bool
+
+    Returns
+    -------
+    (n,) float64
+    """
+    lift = np.zeros(label.max() + 1)
+    np.maximum.at(lift, label[visible], -z[visible])
+    lift[label[index]] = 0.0
+    return np.asarray(z + lift[label])
+
+
 def lifting_discs(
-    vertices: NDArray[np.float64], z: NDArray[np.float64], visible: NDArray[np.bool_]
+    vertices: NDArray[np.float64],
+    z: NDArray[np.float64],
+    label: NDArray[np.int32],
+    visible: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
     """Mark the surroundings of what is visible and lies behind S.
 
@@ -201,20 +235,28 @@ def lifting_discs(
         Original positions.
     z : (n,) float64
         Heights after the construction.
+    label : (n,) int
+        Connected component of each vertex.
     visible : (n,) bool
 
     Returns
     -------
     (n,) bool
-        All vertices within three times its distance to S of a visible vertex behind S: wide enough to lift
-        it without a step, narrow enough to leave the rest alone.
+        Around each visible vertex behind S, all vertices of its component within three times its
+        distance to S, rounded up to a power of two: wide enough to lift it without a step, narrow enough to
+        leave the rest alone.
     """
-    marked = np.zeros(len(vertices), dtype=bool)
-    behind = np.flatnonzero(visible & (z < 0.0))
-    if len(behind):
-        for around in cKDTree(vertices).query_ball_point(vertices[behind], _LIFT * -z[behind]):
-            marked[around] = True
-        marked[behind] = True
+    marked = visible & (z < 0.0)
+    behind = np.flatnonzero(marked)
+    step = np.ceil(np.log2(np.maximum(-z[behind], _SAME_HEIGHT))).astype(np.int64)
+    for component in np.unique(label[behind]):
+        own = np.flatnonzero(label == component)
+        of_own = label[behind] == component
+        for size in np.unique(step[of_own]):
+            centres = behind[of_own & (step == size)]
+            reach = _LIFT * 2.0 ** int(size)
+            distance, _ = cKDTree(vertices[centres]).query(vertices[own], distance_upper_bound=reach)
+            marked[own[np.isfinite(distance)]] = True
     return marked
 
 
@@ -224,6 +266,7 @@ def restore(
     z: NDArray[np.float64],
     high: NDArray[np.bool_],
     index: NDArray[np.int64],
+    label: NDArray[np.int32],
     *,
     blend: float = 0.9,
     in_front: NDArray[np.bool_] | None = None,
@@ -252,6 +295,8 @@ def restore(
         The vertices to solve again.
     index : (q,) int64
         The fixed points; they stay fixed in a component of which every vertex is high.
+    label : (n,) int
+        Connected component of each vertex; one without a fixed point is left as it is.
     blend : float
         t in [0, 1], the share of first order differentials.
     in_front : (n,) bool, optional
@@ -266,58 +311,49 @@ def restore(
     SolverError
         The linear system could not be solved to its tolerance.
     """
-    components, label = connected_components(laplacian, directed=False)
+    components = int(label.max()) + 1
     whole = np.bincount(label, weights=~high, minlength=components) == 0
     held = index[whole[label[index]]]
     solved = high.copy()
     solved[held] = False
-    # A component in which nothing is held was moved as a whole and has no error to mend.
-    anchored = np.bincount(label, weights=~solved, minlength=components) > 0
-    solved &= anchored[label]
+    # A component without a fixed point was moved as a whole and has no error to mend.
+    has_point = np.zeros(components, dtype=bool)
+    has_point[label[index]] = True
+    solved &= has_point[label]
 
-    bounded = np.zeros(len(z), dtype=bool) if in_front is None else in_front
-    result = z.copy()
-    if in_front is not None:
-        _lift_loose(result, label, ~anchored, in_front)
+    bounded = np.zeros(len(z), dtype=bool) if in_front is None else in_front & solved
     system = _System(laplacian, np.flatnonzero(solved), blend)
-    result, on_plane = _in_front(system, vertices[:, 2], result, bounded & solved)
-    return Restoration(z=result, solved=solved, points_held=len(held), set_on_plane=int(on_plane.sum()))
-
-
-def _lift_loose(
-    z: NDArray[np.float64],
-    label: NDArray[np.int32],
-    loose: NDArray[np.bool_],
-    in_front: NDArray[np.bool_],
-) -> None:
-    """Lift each loose component, in place and as a whole, until none of `in_front` is behind S."""
-    lift = np.zeros(len(loose))
-    concerned = np.flatnonzero(in_front & loose[label])
-    np.maximum.at(lift, label[concerned], -z[concerned])
-    z += lift[label]
+    result, on_plane, rounds = _in_front(system, vertices[:, 2], z, bounded)
+    return Restoration(
+        z=result,
+        solved=solved,
+        points_held=len(held),
+        set_on_plane=int(on_plane.sum()),
+        rounds=rounds,
+    )
 
 
 def _in_front(
     system: _System, original: NDArray[np.float64], z: NDArray[np.float64], bounded: NDArray[np.bool_]
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Solve subject to z >= 0 on `bounded`; return the heights and the vertices that lie on the bound."""
+) -> tuple[NDArray[np.float64], NDArray[np.bool_], int]:
+    """Solve subject to z >= 0 on `bounded`; return the heights, the vertices on the bound, the rounds."""
     on_plane = np.zeros(len(z), dtype=bool)
     rounds = 0
     while True:
         result, force = system.solve(original, np.where(on_plane, 0.0, z), on_plane)
+        rounds += 1
         behind = bounded & ~on_plane & (result < -_SAME_HEIGHT)
         # A vertex that is pulled towards S, not held off it, is let go.
         released = on_plane & (force < 0.0)
         if not behind.any() and not released.any():
             break
-        rounds += 1
         if rounds > _ROUNDS:
             # The active set goes round in a circle: from here on it only grows, and so comes to an end.
             released[:] = False
             if not behind.any():
                 break
         on_plane = (on_plane & ~released) | behind
-    return np.where(bounded, np.maximum(result, 0.0), result), on_plane
+    return np.where(bounded, np.maximum(result, 0.0), result), on_plane, rounds
 
 
 class _System:

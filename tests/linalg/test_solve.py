@@ -1,7 +1,7 @@
 import numpy as np
-import open3d as o3d
 import pytest
 import scipy.sparse as sp
+from threadpoolctl import threadpool_limits
 
 from o3d_relief import SolverError, cotangent_laplacian
 from o3d_relief.linalg.solve import solve_spd
@@ -33,18 +33,19 @@ def test_both_ways_agree():
 def test_same_bytes_whatever_the_number_of_threads():
     matrix, right = _system(90)
     once = solve_spd(matrix, right)
-    threads = o3d.utility.get_max_threads()
-    o3d.utility.set_max_threads(1)
-    try:
+    with threadpool_limits(limits=1):
         assert solve_spd(matrix, right).tobytes() == once.tobytes()
-    finally:
-        o3d.utility.set_max_threads(threads)
 
 
 def test_zero_right_hand_side_and_no_unknowns():
     matrix, right = _system(20)
     assert not solve_spd(matrix, 0 * right).any()
     assert solve_spd(sp.csr_array((0, 0)), np.zeros(0)).shape == (0,)
+
+
+def test_singular_matrix_is_an_error():
+    with pytest.raises(SolverError, match="singular"):
+        solve_spd(sp.csr_array(np.array([[1.0, -1], [-1, 1]])), np.array([1.0, 1.0]))
 
 
 def test_system_without_a_solution_is_an_error():

@@ -3,7 +3,7 @@ import pytest
 
 from o3d_relief import MeshError
 from o3d_relief.scene.frame import RELIEF_UNITS, relief_frame, to_relief_units
-from shapes import bust, turn
+from shapes import bust, grid, turn
 
 
 def test_axes_point_right_up_and_to_the_viewer():
@@ -53,6 +53,20 @@ def test_edge_on_scene_is_refused():
         relief_frame(flat, front=(1, 0, 0), up=(0, 0, 1))
     with pytest.raises(MeshError, match="edge-on"):
         relief_frame(np.ones((3, 3)))
+
+
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("scale", [1e-150, 1.0, 1e140])
+def test_edge_on_from_any_side(seed, scale):
+    flat, _ = grid(12)
+    rotation = turn(seed)
+    angle = np.random.default_rng(seed).uniform(0, 7)
+    sideways = rotation @ [np.cos(angle), np.sin(angle), 0]
+    with pytest.raises(MeshError, match="edge-on"):
+        relief_frame(
+            scale * flat @ rotation.T, tuple(sideways), tuple(np.cross(sideways, rotation[:, 0] + 0.3))
+        )
+    assert relief_frame(scale * flat @ rotation.T, tuple(rotation[:, 2]), tuple(rotation[:, 1])).unit > 0
 
 
 def test_flat_scene_from_the_front_is_fine():

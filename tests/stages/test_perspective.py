@@ -31,5 +31,7 @@ def test_wrong_points_are_named():
     vertices = np.array([[0, 0, 0], [1, 1, 30.0]])
     with pytest.raises(ParameterError, match="behind the relief plane"):
         forced_perspective(vertices, (0, 0, 1))
+    with pytest.raises(ParameterError, match="behind the relief plane"):
+        forced_perspective(vertices, (0, 0, -1e-9))
     with pytest.raises(ParameterError, match="in front of the scene"):
         forced_perspective(vertices, (0, 0, -10), view_plane=20)

@@ -8,6 +8,7 @@ from o3d_relief.stages.construction import construct
 from o3d_relief.stages.restoration import (
     cluster_radii,
     depth_order_error,
+    lift_loose,
     lifting_discs,
     order_errors,
     restore,
@@ -16,6 +17,10 @@ from o3d_relief.stages.restoration import (
 from shapes import grid, hills, joined, moved
 
 INDEX = np.array([60, 220])
+
+
+def _one_part(n):
+    return np.zeros(n, dtype=np.int32)
 
 
 def _bent(side=17):
@@ -61,21 +66,21 @@ def test_errors_agree_with_the_literal_equation():
 @pytest.mark.parametrize("blend", [0.0, 0.5, 0.9, 1.0])
 def test_agrees_with_the_literal_appendix(blend):
     shape, laplacian, z, high = _bent()
-    found = restore(shape[0], laplacian, z, high, INDEX, blend=blend)
+    found = restore(shape[0], laplacian, z, high, INDEX, _one_part(len(z)), blend=blend)
     assert np.array_equal(found.solved, high)
     assert found.z == pytest.approx(oracle.restore(shape, z, high, blend), abs=1e-6)
 
 
 def test_only_high_vertices_move():
     shape, laplacian, z, high = _bent()
-    found = restore(shape[0], laplacian, z, high, INDEX)
+    found = restore(shape[0], laplacian, z, high, INDEX, _one_part(len(z)))
     assert np.array_equal(found.z[~high], z[~high])
     assert (found.z[INDEX] != z[INDEX]).all()
 
 
 def test_spike_is_removed():
     shape, laplacian, z, high = _bent()
-    found = restore(shape[0], laplacian, z, high, INDEX)
+    found = restore(shape[0], laplacian, z, high, INDEX, _one_part(len(z)))
     assert (
         np.abs(laplacian @ (found.z - shape[0][:, 2])).max()
         < 0.3 * np.abs(laplacian @ (z - shape[0][:, 2])).max()
@@ -93,20 +98,23 @@ def _sunk():
 def test_everything_visible_behind_is_marked_with_its_surroundings():
     vertices, _, z = _sunk()
     visible = vertices[:, 0] > 0
-    marked = lifting_discs(vertices, z, visible)
+    marked = lifting_discs(vertices, z, _one_part(len(z)), visible)
     behind = visible & (z < 0)
     assert marked[behind].all()
-    reach = 3 * -z[behind]
     distance = np.linalg.norm(vertices[:, None] - vertices[behind], axis=2)
-    assert np.array_equal(marked, (distance <= reach).any(axis=1) | behind)
-    assert not lifting_discs(vertices, np.abs(z), visible).any()
+    assert marked[(distance <= 3 * -z[behind]).any(axis=1)].all()
+    assert not marked[(distance > 6 * -z[behind]).all(axis=1)].any()
+    far = np.where(vertices[:, 0] > 5, 1, 0).astype(np.int32)
+    other = far == 1
+    assert not lifting_discs(vertices, np.where(other, 1.0, z), far, np.ones(len(z), bool))[other].any()
+    assert not lifting_discs(vertices, np.abs(z), _one_part(len(z)), visible).any()
 
 
 def test_nothing_visible_ends_behind_the_plane():
     vertices, laplacian, z = _sunk()
     everywhere = np.ones(len(z), dtype=bool)
-    high = lifting_discs(vertices, z, everywhere)
-    found = restore(vertices, laplacian, z, high, np.array([0]), in_front=everywhere)
+    high = lifting_discs(vertices, z, _one_part(len(z)), everywhere)
+    found = restore(vertices, laplacian, z, high, np.array([0]), _one_part(len(z)), in_front=everywhere)
     assert (found.z >= 0).all()
     assert np.array_equal(found.z[~high], z[~high])
 
@@ -115,7 +123,9 @@ def test_plane_holds_the_surface_off_and_never_pulls_it():
     vertices, laplacian, z = _sunk()
     everywhere = np.ones(len(z), dtype=bool)
     high = np.linalg.norm(vertices[:, :2], axis=1) < 40
-    found = restore(vertices, laplacian, z - 0.9, high, np.array([0]), in_front=everywhere, blend=1.0)
+    found = restore(
+        vertices, laplacian, z - 0.9, high, np.array([0]), _one_part(len(z)), in_front=everywhere, blend=1.0
+    )
     force = (laplacian @ (found.z - vertices[:, 2]))[high]
     on_plane = found.z[high] == 0
     assert (force[on_plane] > -1e-9).all()
@@ -123,23 +133,16 @@ def test_plane_holds_the_surface_off_and_never_pulls_it():
 
 
 def test_loose_component_is_lifted_as_a_whole():
-    floor, _ = grid(21)
-    part = moved(hills(5), (300, 0, 0))
-    shape = joined(grid(21), part)
-    laplacian, _ = cotangent_laplacian(*shape)
-    z = shape[0][:, 2].copy()
-    z[len(floor) :] += -50 - z[len(floor) :].min()
-    everywhere = np.ones(len(z), dtype=bool)
-    high = z < 0
-    found = restore(shape[0], laplacian, z, high, np.array([0]), in_front=everywhere)
-    lift = found.z - z
-    assert lift[len(floor) :] == pytest.approx(50.0)
-    assert not lift[: len(floor)].any()
+    label = np.array([0, 0, 0, 1, 1, 1, 2, 2])
+    z = np.array([-5.0, 1, 2, -3, -7, 4, -1, 0])
+    visible = np.array([True, True, True, True, False, True, False, True])
+    found = lift_loose(z, label, np.array([1]), visible)
+    assert found.tolist() == [-5, 1, 2, 0, -4, 7, -1, 0]
 
 
 def test_no_high_vertices_change_nothing():
     shape, laplacian, z, high = _bent()
-    found = restore(shape[0], laplacian, z, np.zeros_like(high), INDEX)
+    found = restore(shape[0], laplacian, z, np.zeros_like(high), INDEX, _one_part(len(z)))
     assert np.array_equal(found.z, z)
 
 
@@ -150,7 +153,8 @@ def test_wholly_high_component_is_held_by_its_points():
     index = np.array([12])
     z = construct(shape[0], laplacian, index, np.array([1.0])).z
     high = np.ones(50, dtype=bool)
-    found = restore(shape[0], laplacian, z, high, index)
+    label = np.repeat([0, 1], 25).astype(np.int32)
+    found = restore(shape[0], laplacian, z, high, index, label)
     assert found.points_held == 1
     assert found.z[12] == 1.0
     assert np.array_equal(found.z[25:], z[25:])

@@ -1,0 +1,97 @@
+"""The relief's mesh, with the attributes of the input carried over."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import open3d as o3d
+from numpy.typing import NDArray
+
+from o3d_relief.scene.weld import first_of_equal_rows
+from o3d_relief.stages.trim import Trimmed
+
+__all__ = ["smooth_normals", "trimmed_mesh"]
+
+_CREASE = 0.866
+"""Cosine of 30 degrees: normals at one place that differ more from their mean stay apart."""
+
+
+def trimmed_mesh(mesh: o3d.geometry.TriangleMesh, trimmed: Trimmed) -> o3d.geometry.TriangleMesh:
+    """Build the output mesh and carry the input's attributes over to it.
+
+    Vertex colours and triangle UVs are interpolated along the cut, textures and material ids kept, and
+    vertex normals computed anew.
+
+    Parameters
+    ----------
+    mesh : open3d.geometry.TriangleMesh
+        The input, whose vertex and triangle numbers `trimmed` refers to.
+    trimmed : Trimmed
+
+    Returns
+    -------
+    open3d.geometry.TriangleMesh
+    """
+    result = o3d.geometry.TriangleMesh(
+        o3d.utility.Vector3dVector(trimmed.vertices),
+        o3d.utility.Vector3iVector(trimmed.faces.astype(np.int32)),
+    )
+    faces = np.asarray(mesh.triangles, dtype=np.int64)
+    if mesh.has_vertex_colors():
+        colors = trimmed.to_vertices(np.asarray(mesh.vertex_colors))
+        result.vertex_colors = o3d.utility.Vector3dVector(colors)
+    if mesh.has_triangle_uvs():
+        uvs = trimmed.to_corners(faces, np.asarray(mesh.triangle_uvs).reshape(-1, 3, 2))
+        result.triangle_uvs = o3d.utility.Vector2dVector(uvs.reshape(-1, 2))
+    if mesh.has_triangle_material_ids():
+        ids = np.asarray(mesh.triangle_material_ids)[trimmed.face_from]
+        result.triangle_material_ids = o3d.utility.IntVector(ids.astype(np.int32))
+    # Copies: an Image of the list lives only as long as its mesh. Open3D's own reader leaves empty ones
+    # for materials without a texture.
+    result.textures = [
+        o3d.geometry.Image() if image.is_empty() else o3d.geometry.Image(np.array(image))
+        for image in mesh.textures
+    ]
+    normals = smooth_normals(trimmed.vertices, trimmed.faces)
+    result.vertex_normals = o3d.utility.Vector3dVector(normals)
+    return result
+
+
+def smooth_normals(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Compute vertex normals that do not show the seams of a mesh.
+
+    Area-weighted face normals, shared by all vertices at one place but for those that differ by more than
+    30 degrees from their common mean: these lie at a crease.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+    faces : (m, 3) int64
+
+    Returns
+    -------
+    (n, 3) float64
+        Of unit length; +z for a vertex whose faces have no area.
+    """
+    a, b, c = vertices[faces].transpose(1, 0, 2)
+    area_normal = np.cross(b - a, c - a)
+    own = np.stack(
+        [
+            np.bincount(faces.ravel(), weights=np.repeat(along, 3), minlength=len(vertices))
+            for along in area_normal.T
+        ],
+        axis=1,
+    )
+    first = first_of_equal_rows(vertices)
+    shared = np.stack(
+        [np.bincount(first, weights=along, minlength=len(vertices)) for along in own.T], axis=1
+    )[first]
+    own_unit, shared_unit = _unit(own), _unit(shared)
+    alike = (own_unit * shared_unit).sum(axis=1) >= _CREASE
+    return np.where(alike[:, None], shared_unit, own_unit)
+
+
+def _unit(vectors: NDArray[Any]) -> NDArray[np.float64]:
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.where(length > 0.0, vectors / np.where(length > 0.0, length, 1.0), [0.0, 0.0, 1.0])
