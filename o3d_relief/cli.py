@@ -326,6 +326,8 @@ def _tell_result(path: Path, relief: Relief, seconds: float) -> None:
         _tell(
             f"the relief is {report['relief_depth']:.4g} deep, less than was asked for: it is not stretched"
         )
+    if left := relief.stages["order"].counts.get("left", 0):
+        _tell(f"{left} pairs of surfaces could not be brought back into order; a smaller k may help")
     _tell(
         f"{path}: {report['vertices']} vertices, {report['triangles']} triangles; "
         f"depth {report['scene_depth']:.4g} -> {report['relief_depth']:.4g}, {seconds:.1f} s in all"

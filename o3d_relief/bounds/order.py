@@ -26,8 +26,15 @@ _REGION = 3.0
 _MARGIN = 0.2
 _FIRST_STIFFNESS = 10.0
 _GROWTH = 4.0
-_STIFFEST = 1e5
-_ROUNDS = 30
+_STIFFEST = 1e3
+_STIFFEST_OF_THE_LAST = 1e6
+_PATIENCE = 10
+"""Very stiff springs make the systems hard to solve: only the few that are still wrong after this many
+rounds become so."""
+
+_PROGRESS = 0.9
+_WITHOUT_PROGRESS = 4
+"""After so many rounds that did not lower what is left to this share of it, the best so far is taken."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -119,15 +126,21 @@ def keep_order(
     on_pairs, on_floor = _Multipliers(len(pairs)), _Multipliers(len(z))
     wanted, wanted_height = _wanted_gaps(pairs, min_gap), np.full(len(z), _MARGIN / 10)
     current, rounds = z, 0
+    best, fewest, best_round = z, len(pairs) + len(z) + 1, 0
     while True:
         wrong = out_of_order(pairs, current, min_gap=min_gap)
         behind = front & (current < 0.0)
         left = int(wrong.sum()) + int(behind.sum())
-        if left == 0 or rounds == _ROUNDS:
+        if left <= _PROGRESS * fewest:
+            best_round = rounds
+        if left < fewest:
+            best, fewest = current, left
+        if left == 0 or rounds - best_round >= _WITHOUT_PROGRESS:
             break
         upper, lower = pairs.heights(current)
-        springs = on_pairs.update(wrong, wanted - (upper - lower))
-        lifts = on_floor.update(behind, wanted_height - current)
+        stiffest = _STIFFEST if rounds < _PATIENCE else _STIFFEST_OF_THE_LAST
+        springs = on_pairs.update(wrong, wanted - (upper - lower), stiffest)
+        lifts = on_floor.update(behind, wanted_height - current, stiffest)
         current = system.solve(
             z,
             pairs.select(springs),
@@ -138,7 +151,7 @@ def keep_order(
         )
         rounds += 1
     corrected = int((on_pairs.stiffness > 0.0).sum())
-    return Ordered(z=current, rounds=rounds, corrected_pairs=corrected, left=left)
+    return Ordered(z=best, rounds=rounds, corrected_pairs=corrected, left=fewest)
 
 
 class _Multipliers:
@@ -148,14 +161,16 @@ class _Multipliers:
         self.stiffness = np.zeros(count)
         self.force = np.zeros(count)
 
-    def update(self, wrong: NDArray[np.bool_], missing: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def update(
+        self, wrong: NDArray[np.bool_], missing: NDArray[np.float64], stiffest: float
+    ) -> NDArray[np.bool_]:
         """Return which springs act next, given what is wrong and what each lacks of what is wanted.
 
         What a spring could not hold is added to its force; one whose force would pull lets go; one that is
         still wrong gets stiffer.
         """
         self.force = np.maximum(self.force + self.stiffness * missing, 0.0)
-        self.stiffness[wrong] = np.clip(self.stiffness[wrong] * _GROWTH, _FIRST_STIFFNESS, _STIFFEST)
+        self.stiffness[wrong] = np.clip(self.stiffness[wrong] * _GROWTH, _FIRST_STIFFNESS, stiffest)
         return (self.stiffness > 0.0) & ((self.force > 0.0) | (missing > 0.0))
 
     @property

@@ -1,0 +1,59 @@
+import numpy as np
+import pytest
+
+from o3d_relief.bounds.pairs import grid_pairs, touching_pairs, vertex_pairs
+from shapes import bust, grid, joined, moved
+
+
+def _two_plates(gap=10.0):
+    return joined(grid(11), moved(grid(5, size=40), (0, 0, gap)))
+
+
+@pytest.mark.parametrize("find", [vertex_pairs, lambda v, f: grid_pairs(v, f, side=64)])
+def test_plate_above_plate(find):
+    vertices, faces = _two_plates()
+    pairs = find(vertices, faces)
+    assert len(pairs) > 20
+    assert pairs.gap == pytest.approx(10.0, abs=1e-4)
+    assert (pairs.upper >= 121).all()
+    assert (pairs.lower < 121).all()
+
+
+def test_points_of_a_pair_lie_above_each_other():
+    vertices, faces = bust()
+    for pairs in (vertex_pairs(vertices, faces), grid_pairs(vertices, faces, side=128)):
+        upper = np.einsum("pcx,pc->px", vertices[pairs.upper], pairs.upper_weights)
+        lower = np.einsum("pcx,pc->px", vertices[pairs.lower], pairs.lower_weights)
+        assert upper[:, :2] == pytest.approx(lower[:, :2], abs=2e-3)
+        assert upper[:, 2] - lower[:, 2] == pytest.approx(pairs.gap)
+        assert (pairs.gap > 0).all()
+
+
+def test_difference_is_linear_in_the_heights():
+    vertices, faces = bust()
+    pairs = vertex_pairs(vertices, faces)
+    z = np.random.default_rng(0).normal(size=len(vertices))
+    upper, lower = pairs.heights(z)
+    assert pairs.difference(len(z)) @ z == pytest.approx(upper - lower)
+    assert pairs.difference(len(z)) @ vertices[:, 2] == pytest.approx(pairs.gap)
+
+
+def test_grid_pairs_join_neighbours_on_a_line_only():
+    vertices, faces = joined(grid(5), moved(grid(5), (0, 0, 4)), moved(grid(5), (0, 0, 20)))
+    pairs = grid_pairs(vertices, faces, side=32)
+    assert len(pairs) == 2 * 32 * 32
+    assert sorted(set(np.round(pairs.gap).astype(int))) == [4, 16]
+
+
+def test_touching_parts_are_found_whichever_way_they_lie():
+    base = grid(5, size=20)
+    parts = [moved(grid(3, size=4), (0, 0, 0.05)), moved(grid(3, size=4), (0, 0, 3))]
+    side = grid(3, size=4)[0][:, [2, 1, 0]] + [10.05, 0, 0], grid(3, size=4)[1]
+    vertices, faces = joined(base, *parts, side)
+    label = np.repeat([0, 1, 2, 3], [25, 9, 9, 9])
+    pairs = touching_pairs(vertices, faces, label, 0.1)
+    met = {
+        tuple(sorted(pair)) for pair in zip(label[pairs.upper[:, 0]], label[pairs.lower[:, 0]], strict=True)
+    }
+    assert met == {(0, 1), (0, 3)}
+    assert (pairs.gap <= 0.1).all()
