@@ -30,6 +30,7 @@ from o3d_relief.steps import (
     scene_step,
     stacked_pairs,
     trim_step,
+    turned_to_viewer,
     visibility_step,
 )
 
@@ -190,7 +191,8 @@ def make_relief(
     z = journal.keep(order_step(vertices, faces, visible, laplacian, z, pairs, params, scene.unit)).z
     z = journal.keep(compression_step(z, params, scene.unit)).z
 
-    trimmed = trim_step(in_vertices, in_faces, frame, scene, vertices, z)
+    out_faces, turned = turned_to_viewer(in_faces, scene, vertices, visible, laplacian)
+    trimmed = trim_step(in_vertices, out_faces, frame, scene, vertices, z)
     if len(trimmed.faces) == 0:
         raise MeshError("Nothing of the scene is left in front of the relief plane.")
     relief_mesh = trimmed_mesh(mesh, trimmed)
@@ -202,6 +204,7 @@ def make_relief(
                 "faces_cut": trimmed.faces_cut,
                 "faces_dropped": trimmed.faces_dropped,
                 "cut_vertices": int((trimmed.source_index < 0).sum()),
+                "faces_turned": turned,
             }
         )
     )

@@ -50,7 +50,7 @@ from o3d_relief.stages.restoration import (
     smoothing_discs,
 )
 from o3d_relief.stages.trim import Trimmed, trim_behind
-from o3d_relief.stages.visibility import visible_vertices
+from o3d_relief.stages.visibility import turned_away, visible_vertices
 
 _ON_PLANE = 1e-9
 """Heights within this of S, in relief units, lie on it: rounding errors leave no slivers at the cut."""
@@ -338,3 +338,18 @@ def trim_step(
     moved[usable, :2] += (vertices - scene.vertices)[welded, :2]
     moved[usable, 2] = z[welded]
     return trim_behind(moved * frame.unit, in_faces, usable)
+
+
+def turned_to_viewer(
+    in_faces: NDArray[np.int64],
+    scene: SceneStage,
+    vertices: NDArray[np.float64],
+    visible: NDArray[np.bool_],
+    laplacian: sp.csr_array,
+) -> tuple[NDArray[np.int64], int]:
+    """Turn the faces of components that show their inside; return the faces and how many were turned."""
+    _, label = connected_components(laplacian, directed=False)
+    away = turned_away(vertices, scene.faces, visible, label)
+    welded = scene.welded_index[in_faces[:, 0]]
+    turn = (welded >= 0) & away[label[welded]]
+    return np.where(turn[:, None], in_faces[:, [0, 2, 1]], in_faces), int(turn.sum())

@@ -308,6 +308,27 @@ def test_parts_that_hold_no_point_are_counted_and_moved(mesh):
     assert tied.stages["construction"].counts["ties_across_gaps"] > 0
 
 
+def test_inside_out_parts_are_turned_to_the_viewer(relief):
+    vertices, faces = bust()
+    mesh = to_mesh((vertices, faces[:, ::-1]))
+    mesh.triangle_uvs = o3d.utility.Vector2dVector(vertices[faces[:, ::-1]].reshape(-1, 3)[:, :2])
+    again = rel.make_relief(mesh, PARAMS)
+    assert again.stages["trim"].counts["faces_turned"] == len(faces)
+    assert relief.stages["trim"].counts["faces_turned"] == 0
+    normals = []
+    for mesh in (relief.mesh, again.mesh):
+        a, b, c = np.asarray(mesh.vertices)[np.asarray(mesh.triangles)].transpose(1, 0, 2)
+        normals.append(np.cross(b - a, c - a).sum(axis=0))
+    assert normals[0] == pytest.approx(normals[1], rel=1e-9, abs=1e-6)
+    assert normals[0][2] > 0
+    uvs = np.asarray(again.mesh.triangle_uvs)
+    xy = (
+        np.asarray(again.mesh.vertices)[np.asarray(again.mesh.triangles)].reshape(-1, 3)
+        + again.to_scene[:3, 3]
+    )
+    assert uvs == pytest.approx(xy[:, :2], abs=1e-6)
+
+
 def test_attributes_survive_the_weld_and_the_cut():
     vertices, faces = exploded(bust(24))
     mesh = to_mesh((vertices, faces))

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from o3d_relief.errors import ParameterError
 
-__all__ = ["visible_vertices"]
+__all__ = ["turned_away", "visible_vertices"]
 
 _NEAR = 1e-4
 """A ray leaves its vertex by this share of the scene's size before it can hit anything, because it would
@@ -64,3 +64,36 @@ def visible_vertices(
     rays[:, :3] = unit_box + np.float32(_NEAR) * rays[:, 3:]
     occluded = scene.test_occlusions(o3d.core.Tensor(rays))
     return np.asarray(~occluded.numpy().astype(bool))
+
+
+def turned_away(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    visible: NDArray[np.bool_],
+    label: NDArray[np.int32],
+) -> NDArray[np.bool_]:
+    """Find the components that show the viewer their inside.
+
+    A relief is open at the back: where the faces of a scan turn the wrong way, viewers and slicers would take
+    its front for its inside.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+        In the relief frame.
+    faces : (m, 3) int64
+    visible : (n,) bool
+    label : (n,) int
+        Connected component of each vertex.
+
+    Returns
+    -------
+    (components,) bool
+        True where the visible faces, by their area as seen from the front, turn away from the viewer.
+    """
+    a, b, c = vertices[faces][:, :, :2].transpose(1, 0, 2)
+    u, v = b - a, c - a
+    seen_area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    seen_area = np.where(visible[faces].all(axis=1), seen_area, 0.0)
+    total = np.bincount(label[faces[:, 0]], weights=seen_area, minlength=int(label.max()) + 1)
+    return np.asarray(total < 0.0)
