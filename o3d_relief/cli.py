@@ -141,6 +141,9 @@ def _parser() -> argparse.ArgumentParser:
         "--report", type=Path, metavar="FILE.json", help="write parameters, counts, times and depths"
     )
     make.add_argument("--stages", type=Path, metavar="DIR", help="write a picture of each stage")
+    make.add_argument(
+        "--strict", action="store_true", help="refuse a relief that does not keep what the certificate tests"
+    )
     make.set_defaults(run=_make)
 
     demo = commands.add_parser(
@@ -250,6 +253,8 @@ def _make(options: argparse.Namespace) -> None:
         relief = make_relief(mesh, params, view=view, on_stage=_tell_stage)
     except MeshError as error:
         raise MeshError(f"{options.input}: {error}") from error
+    if options.strict and relief.certificate.failures:
+        raise ReliefError(f"{options.output} is not written (--strict): {relief.certificate.failures[0]}")
     write_mesh(options.output, relief.mesh)
     if options.report is not None:
         _write_report(options.report, relief)
@@ -321,7 +326,7 @@ def _write_stages(folder: Path, relief: Relief) -> None:
 
 
 def _tell_result(path: Path, relief: Relief, seconds: float) -> None:
-    report = relief.report()
+    report = relief.summary()
     if relief.stages["compression"].counts.get("already_shallower"):
         _tell(
             f"the relief is {report['relief_depth']:.4g} deep, less than was asked for: it is not stretched"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any, TypeVar
 
@@ -12,12 +13,15 @@ import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
+from o3d_relief.bounds.certificate import Certificate, certify
 from o3d_relief.errors import MeshError, ParameterError
 from o3d_relief.linalg.laplacian import cotangent_laplacian
 from o3d_relief.output import trimmed_mesh
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.records import StageRecord, TrimStage
 from o3d_relief.scene.convert import mesh_arrays
+from o3d_relief.scene.weld import weld
+from o3d_relief.stages.trim import Trimmed
 from o3d_relief.steps import (
     attenuation_step,
     clusters_step,
@@ -56,6 +60,11 @@ class Relief:
         One record for each stage, in order.
     params : ReliefParams
     view : View
+    certificate : Certificate
+        What was tested and what failed; computed when it is first asked for.
+    trimmed : Trimmed
+        How the cut was made: between which input vertices each output vertex lies, the input face of each
+        output face.
     """
 
     mesh: o3d.geometry.TriangleMesh
@@ -64,6 +73,7 @@ class Relief:
     stages: Mapping[str, StageRecord]
     params: ReliefParams
     view: View
+    trimmed: Trimmed
 
     def __post_init__(self) -> None:
         self.to_scene.flags.writeable = False
@@ -76,8 +86,40 @@ class Relief:
             f"{depth:.4g} deep, stages {', '.join(self.stages)}>"
         )
 
+    @cached_property
+    def certificate(self) -> Certificate:
+        """Test what the relief keeps of its scene, on its mesh; done when it is first asked for."""
+        scene: Any = self.stages["scene"]
+        in_z = np.append(scene.vertices[:, 2], 0.0)[scene.welded_index]  # -1, unused, takes the last one
+        before = self.trimmed.to_vertices(in_z[:, None])[:, 0]
+        welded = weld(self.trimmed.vertices / scene.unit, self.trimmed.faces)
+        _, first = np.unique(np.append(-1, welded.index), return_index=True)
+        stages: dict[str, Any] = dict(self.stages)
+        return certify(
+            relief=welded.vertices,
+            relief_faces=welded.faces,
+            relief_before=before[first[1:] - 1],
+            scene=stages["perspective"].vertices,
+            scene_faces=scene.faces,
+            heights=stages["compression"].z,
+            visible=stages["visibility"].visible,
+            points=stages["attenuation"].kept_index,
+            min_gap=self.params.min_gap / scene.unit,
+        )
+
     def report(self) -> dict[str, Any]:
         """Sum the relief up in plain values, for JSON.
+
+        Returns
+        -------
+        dict
+            The summary, and the certificate with a sentence for each thing that does not hold.
+        """
+        certificate = asdict(self.certificate) | {"failures": self.certificate.failures}
+        return self.summary() | {"certificate": certificate}
+
+    def summary(self) -> dict[str, Any]:
+        """Sum up what is known without further measurement.
 
         Returns
         -------
@@ -86,19 +128,17 @@ class Relief:
             alone, in the input's unit), the share of the visible vertices that lay behind S before the
             trim, and the time and counts of each stage.
         """
-        scene, z = self.stages["scene"], self.stages["compression"].z  # type: ignore[attr-defined]
-        visible = self.stages["visibility"].visible  # type: ignore[attr-defined]
-        before = scene.vertices[:, 2]  # type: ignore[attr-defined]
-        unit = scene.unit  # type: ignore[attr-defined]
-        relief_z = np.asarray(self.mesh.vertices)[:, 2]
+        stages: dict[str, Any] = dict(self.stages)
+        scene, z, visible = stages["scene"], stages["compression"].z, stages["visibility"].visible
+        before = scene.vertices[:, 2]
         return {
             "params": asdict(self.params),
             "view": asdict(self.view),
-            "unit": unit,
-            "scene_depth": float(np.ptp(before)) * unit,
-            "scene_visible_depth": float(np.ptp(before[visible])) * unit,
-            "relief_depth": float(relief_z.max()),
-            "relief_visible_depth": float(np.ptp(z[visible])) * unit,
+            "unit": scene.unit,
+            "scene_depth": float(np.ptp(before)) * scene.unit,
+            "scene_visible_depth": float(np.ptp(before[visible])) * scene.unit,
+            "relief_depth": float(np.asarray(self.mesh.vertices)[:, 2].max()),
+            "relief_visible_depth": float(np.ptp(z[visible])) * scene.unit,
             "visible_behind_share": float((z[visible] < 0.0).mean()),
             "vertices": len(self.mesh.vertices),
             "triangles": len(self.mesh.triangles),
@@ -215,4 +255,5 @@ def make_relief(
         stages=MappingProxyType(journal.stages),
         params=params,
         view=view,
+        trimmed=trimmed,
     )

@@ -194,14 +194,15 @@ def construction_step(
     ties = None
     if pairs is not None:
         beta = _beta_of_clusters(points, len(clusters.centers))[clusters.labels[pairs.upper[:, 0]]]
-        ties = tie_parts(vertices, faces, laplacian, pairs, attenuate(pairs.gap, beta))
+        shrink = attenuate(pairs.gap, beta)
+        ties = tie_parts(vertices, faces, laplacian, points.kept_index, pairs, shrink)
     built = construct(
         vertices,
         laplacian,
         points.kept_index,
         points.kept_height,
-        ties=None if ties is None else ties.form,
-        pull=None if ties is None else ties.pull,
+        among_held=None if ties is None else (ties.among_held, ties.among_held_pull),
+        to_loose=None if ties is None else (ties.to_loose, ties.to_loose_pull),
     )
     counts = {
         "fixed_points": len(points.kept_index),

@@ -71,6 +71,8 @@ def test_report_says_what_happened(tmp_path, scene):
     assert values["visible_behind_share"] == 0.0
     assert values["scene_depth"] > values["relief_depth"]
     assert values["stages"]["clusters"]["counts"]["clusters"] == 16
+    assert values["certificate"]["visible_behind"] == 0
+    assert values["certificate"]["vertex_pairs_tested"] > 0
     assert values["stages"]["construction"]["seconds"] > 0
 
 
@@ -137,6 +139,14 @@ def test_a_mesh_error_names_the_file(tmp_path, scene, capsys):
     flat = tmp_path / "flat.ply"
     o3d.io.write_triangle_mesh(str(flat), to_mesh(grid(5)))
     assert "flat.ply: The scene is seen edge-on" in _fails(capsys, "make", flat, tmp_path / "r.ply", *words)
+
+
+def test_strict_refuses_what_the_certificate_finds(tmp_path, scene, capsys):
+    out = tmp_path / "r.ply"
+    sentence = _fails(capsys, "make", scene, out, "-k", "64", "--no-in-front", "--strict")
+    assert "is not written (--strict): " in sentence
+    assert "visible vertices lie behind" in sentence
+    assert _files(tmp_path) == ["scene.ply"]
 
 
 def test_version_and_module(tmp_path):

@@ -31,20 +31,26 @@ _TOUCH = 0.1
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Ties:
-    """Springs between parts, as an addition to the system of the construction.
+    """Springs between parts, as additions to the systems of the construction.
 
     Attributes
     ----------
-    form : (n, n) sparse float64
-        To be added to the cotangent Laplacian.
-    pull : (n,) float64
+    among_held : (n, n) sparse float64
+        Quadratic form of the springs between parts that hold a fixed point.
+    among_held_pull : (n,) float64
         The right-hand side that belongs to it.
+    to_loose : (n, n) sparse float64
+        The same for all springs of which at least one end lies on a loose part: loose parts follow, and do
+        not pull.
+    to_loose_pull : (n,) float64
     across_gaps, in_contact, to_nearest : int
         Number of springs of each kind.
     """
 
-    form: sp.csr_array
-    pull: NDArray[np.float64]
+    among_held: sp.csr_array
+    among_held_pull: NDArray[np.float64]
+    to_loose: sp.csr_array
+    to_loose_pull: NDArray[np.float64]
     across_gaps: int
     in_contact: int
     to_nearest: int
@@ -54,6 +60,7 @@ def tie_parts(
     vertices: NDArray[np.float64],
     faces: NDArray[np.int64],
     laplacian: sp.csr_array,
+    index: NDArray[np.int64],
     pairs: Pairs,
     shrink: NDArray[np.float64],
 ) -> Ties | None:
@@ -66,6 +73,8 @@ def tie_parts(
     faces : (m, 3) int64
     laplacian : (n, n) sparse float64
         The cotangent Laplacian, whose graph tells the components.
+    index : (q,) int64
+        The fixed points; a component without one is loose.
     pairs : Pairs
         What is stacked on vertical lines, of one component or of two.
     shrink : (p,) float64
@@ -79,20 +88,35 @@ def tie_parts(
     count, label = connected_components(laplacian, directed=False)
     if count == 1:
         return None
+    n = len(vertices)
     across = label[pairs.upper[:, 0]] != label[pairs.lower[:, 0]]
     apart = pairs.select(across)
     touching = touching_pairs(vertices, faces, label, _TOUCH)
-    gap_rows, contact_rows = apart.difference(len(vertices)), touching.difference(len(vertices))
-    form = _ACROSS_GAPS * (gap_rows.T @ gap_rows) + _IN_CONTACT * (contact_rows.T @ contact_rows)
-    pull = _ACROSS_GAPS * (gap_rows.T @ (shrink[across] - apart.gap))
+    everything = laplacian + apart.difference(n).T @ apart.difference(n)
+    everything = everything + touching.difference(n).T @ touching.difference(n)
+    strays = _nearest_outside(vertices, *connected_components(everything, directed=False))
 
-    groups, group = connected_components(laplacian + form, directed=False)
-    strays = _nearest_outside(vertices, groups, group)
-    stray_rows = _edge_rows(strays, len(vertices))
-    form = (form + _IN_CONTACT * (stray_rows.T @ stray_rows)).tocsr()
+    held = np.isin(label, label[index])
+    rows = sp.vstack([apart.difference(n), touching.difference(n), _edge_rows(strays, n)]).tocsr()
+    stiffness = np.repeat([_ACROSS_GAPS, _IN_CONTACT, _IN_CONTACT], [len(apart), len(touching), len(strays)])
+    change = np.concatenate([shrink[across] - apart.gap, np.zeros(len(touching) + len(strays))])
+    loose = np.concatenate(
+        [
+            ~(held[apart.upper[:, 0]] & held[apart.lower[:, 0]]),
+            ~(held[touching.upper[:, 0]] & held[touching.lower[:, 0]]),
+            ~held[strays].all(axis=1),
+        ]
+    )
+    form, pull = [], []
+    for chosen in (~loose, loose):
+        weighted = rows[chosen].T @ sp.diags_array(stiffness[chosen])
+        form.append((weighted @ rows[chosen]).tocsr())
+        pull.append(np.asarray(weighted @ change[chosen]))
     return Ties(
-        form=form,
-        pull=np.asarray(pull),
+        among_held=form[0],
+        among_held_pull=pull[0],
+        to_loose=form[1],
+        to_loose_pull=pull[1],
         across_gaps=len(apart),
         in_contact=len(touching),
         to_nearest=len(strays),

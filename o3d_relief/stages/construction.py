@@ -25,12 +25,16 @@ class Construction:
     components : int
         Connected components of the mesh.
     loose_components : int
-        Components, or tied groups of them, without a fixed point, which were moved as a whole.
+        Components without a fixed point, and not tied to one, which were moved as a whole.
     """
 
     z: NDArray[np.float64]
     components: int
     loose_components: int
+
+
+Springs = tuple[sp.csr_array, NDArray[np.float64]]
+"""A quadratic form (n, n) and the right-hand side (n,) that belongs to it."""
 
 
 def construct(
@@ -39,8 +43,8 @@ def construct(
     index: NDArray[np.int64],
     new_height: NDArray[np.float64],
     *,
-    ties: sp.csr_array | None = None,
-    pull: NDArray[np.float64] | None = None,
+    among_held: Springs | None = None,
+    to_loose: Springs | None = None,
 ) -> Construction:
     """Find the z of all vertices from fixed points and differential coordinates.
 
@@ -50,11 +54,11 @@ def construct(
     written for the displacement d = z' - z, it says that d is discrete harmonic: C_ff d_f = -C_fc d_c
     with the symmetric cotangent Laplacian C. Solving for d avoids the cancellation in L z.
 
-    Springs between components may be added to the system: (C + ties)_ff d_f = pull_f - (C + ties)_fc d_c.
-
-    A connected component without a fixed point, and not tied to one, has no equation. It moves as a
-    whole, by the displacement of the nearest vertex (in space) of the components that have one, so that
-    Eq. 7 holds on it as well.
+    A connected component without a fixed point is loose: it has no equation. Springs may tie it to
+    others; it is then solved after them, (C + springs)_ff d_f = pull_f - (C + springs)_fc d_c, so that it
+    follows and does not pull. Untied, it moves as a whole, by the displacement of the nearest vertex (in
+    space) that is not loose, so that Eq. 7 holds on it as well. Springs among components with fixed points
+    are added to the first system.
 
     Parameters
     ----------
@@ -66,10 +70,10 @@ def construct(
         The fixed vertices, at least one, each once.
     new_height : (q,) float64
         Their z.
-    ties : (n, n) sparse float64, optional
-        Quadratic form of the springs.
-    pull : (n,) float64, optional
-        Their right-hand side; zero where omitted.
+    among_held : quadratic form and right-hand side, optional
+        Springs between components with fixed points.
+    to_loose : quadratic form and right-hand side, optional
+        Springs with an end on a loose component.
 
     Returns
     -------
@@ -81,28 +85,44 @@ def construct(
         The linear system could not be solved.
     """
     z = vertices[:, 2]
-    components, _ = connected_components(laplacian, directed=False)
-    system = laplacian if ties is None else (laplacian + ties).tocsr()
-    groups, label = connected_components(system, directed=False)
-    has_point = np.zeros(groups, dtype=bool)
-    has_point[label[index]] = True
-    controlled = has_point[label]
+    components, label = connected_components(laplacian, directed=False)
+    held = np.isin(label, label[index])
     fixed = np.zeros(len(z), dtype=bool)
     fixed[index] = True
     displacement = np.zeros(len(z))
     displacement[index] = new_height - z[index]
+    _solve_free(laplacian, among_held, held & ~fixed, displacement)
 
-    free = np.flatnonzero(controlled & ~fixed)
-    rows = system[free]
-    right_hand_side = -(rows @ displacement)
-    if pull is not None:
-        right_hand_side += pull[free]
-    displacement[free] = solve_spd(rows[:, free].tocsr(), right_hand_side)
-    _move_loose(vertices, label, controlled, displacement)
+    known = held
+    if to_loose is not None:
+        _, group = connected_components(laplacian + to_loose[0], directed=False)
+        known = np.isin(group, group[held])
+        _solve_free(laplacian, to_loose, known & ~held, displacement)
+    _move_loose(vertices, label, known, displacement)
 
     moved = z + displacement
     moved[index] = new_height
-    return Construction(z=moved, components=components, loose_components=int((~has_point).sum()))
+    loose = len(np.unique(label[~known]))
+    return Construction(z=moved, components=components, loose_components=loose)
+
+
+def _solve_free(
+    laplacian: sp.csr_array,
+    springs: Springs | None,
+    free_mask: NDArray[np.bool_],
+    displacement: NDArray[np.float64],
+) -> None:
+    """Solve for the displacement of the free vertices, in place."""
+    free = np.flatnonzero(free_mask)
+    rows = laplacian[free]
+    right_hand_side = np.zeros(len(free))
+    if springs is not None:
+        form, pull = springs
+        rows = (rows + form[free]).tocsr()
+        right_hand_side = pull[free]
+    displacement[free] = 0.0
+    right_hand_side = right_hand_side - rows @ displacement
+    displacement[free] = solve_spd(rows[:, free].tocsr(), right_hand_side)
 
 
 def _move_loose(

@@ -8,30 +8,35 @@ from o3d_relief.stages.construction import construct
 from shapes import bust, grid, joined, moved, sphere, to_mesh
 
 
-def _tie(shape, shrink=0.3):
+def _tie(shape, index, shrink=0.3):
     vertices, faces = shape
     laplacian, _ = cotangent_laplacian(vertices, faces)
     pairs = vertex_pairs(vertices, faces)
-    return laplacian, tie_parts(vertices, faces, laplacian, pairs, shrink * pairs.gap)
+    return laplacian, tie_parts(vertices, faces, laplacian, index, pairs, shrink * pairs.gap)
 
 
 def test_one_component_has_nothing_to_tie():
-    assert _tie(bust())[1] is None
+    assert _tie(bust(), np.array([0]))[1] is None
 
 
 def test_springs_are_symmetric_and_leave_a_common_move_alone():
-    _, ties = _tie(joined(grid(11), moved(grid(5, size=40), (0, 0, 10)), moved(sphere(8, 5), (200, 0, 0))))
-    assert abs(ties.form - ties.form.T).max() < 1e-12
-    assert abs(ties.form.sum(axis=1)).max() < 1e-12
-    assert np.linalg.eigvalsh(ties.form.toarray()).min() > -1e-9
+    plates = [moved(grid(5, size=40), (0, 0, 10)), moved(grid(5, size=40), (0, 0, 30))]
+    shape = joined(grid(11), *plates, moved(sphere(8, 5), (200, 0, 0)))
+    _, ties = _tie(shape, np.array([0, 130]))  # the wall and the first plate hold points
+    for form in (ties.among_held, ties.to_loose):
+        assert abs(form - form.T).max() < 1e-12
+        assert abs(form.sum(axis=1)).max() < 1e-12
+        assert np.linalg.eigvalsh(form.toarray()).min() > -1e-9
+        assert form.nnz > 0
+    assert ties.among_held[146:].nnz == 0
     assert ties.to_nearest == 1
 
 
 def test_empty_space_shrinks_and_the_part_follows():
     shape = joined(grid(21), moved(grid(9, size=40), (0, 0, 10)))
-    laplacian, ties = _tie(shape)
     corners = np.array([0, 20, 420, 440])
-    built = construct(shape[0], laplacian, corners, np.zeros(4), ties=ties.form, pull=ties.pull)
+    laplacian, ties = _tie(shape, corners)
+    built = construct(shape[0], laplacian, corners, np.zeros(4), to_loose=(ties.to_loose, ties.to_loose_pull))
     assert built.loose_components == 0
     assert built.z[:441].max() < 2.0
     gap = built.z[441:] - 0.5 * built.z[:441].max()
@@ -43,10 +48,13 @@ def test_parts_that_touch_still_touch():
     floor[0][:, 2] += 0.2 * floor[0][:, 0]  # a slope: the post must follow it
     post = moved(grid(5, size=6), (30, 0, 11.02))
     shape = joined(floor, post)
-    laplacian, ties = _tie(shape)
-    assert ties.in_contact > 0
     fixed = np.array([0, 20, 420, 440])
-    built = construct(shape[0], laplacian, fixed, 0.2 * shape[0][fixed, 2], ties=ties.form, pull=ties.pull)
+    laplacian, ties = _tie(shape, fixed)
+    assert ties.in_contact > 0
+    springs = (ties.to_loose, ties.to_loose_pull)
+    built = construct(shape[0], laplacian, fixed, 0.2 * shape[0][fixed, 2], to_loose=springs)
+    alone = construct(shape[0], laplacian, fixed, 0.2 * shape[0][fixed, 2])
+    assert np.array_equal(built.z[:441], alone.z[:441])  # what is loose does not pull
     displacement = built.z - shape[0][:, 2]
     under = (np.abs(shape[0][:441, :2] - [30, 0]) <= 5).all(axis=1)
     assert displacement[441:].mean() == pytest.approx(displacement[:441][under].mean(), abs=0.4)

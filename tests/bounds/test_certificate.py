@@ -1,0 +1,103 @@
+import numpy as np
+import open3d as o3d
+import pytest
+
+import o3d_relief as rel
+from o3d_relief.bounds.certificate import crossings, inversions, normal_changes
+from o3d_relief.bounds.pairs import grid_pairs, vertex_pairs
+from shapes import bust, grid, joined, moved, sphere, to_mesh
+
+
+def test_swapped_plates_are_inverted_and_others_are_not():
+    scene, faces = joined(grid(11), moved(grid(5, size=40), (0, 0, 10)))
+    relief = scene.copy()
+    relief[121:, 2] = -3.0
+    for pairs in (vertex_pairs(relief, faces), grid_pairs(relief, faces, side=64)):
+        found = inversions(relief, pairs, scene[:, 2])
+        assert found.inverted == found.tested > 0
+        assert found.worst == pytest.approx(10.0, abs=1e-3)
+        assert all(abs(x) <= 20 and abs(y) <= 20 for x, y in found.places)
+        assert inversions(relief, pairs, relief[:, 2]).inverted == 0
+
+
+def test_gaps_that_became_too_small_are_counted():
+    scene, faces = joined(grid(11), moved(grid(5, size=40), (0, 0, 10)))
+    relief = scene * [1, 1, 0.1]
+    pairs = grid_pairs(relief, faces, side=64)
+    assert inversions(relief, pairs, scene[:, 2], min_gap=2.0).gaps_missed == len(pairs)
+    assert inversions(relief, pairs, scene[:, 2], min_gap=0.5).gaps_missed == 0
+    assert inversions(relief, pairs, relief[:, 2], min_gap=2.0).gaps_tested == 0
+
+
+def test_crossing_balls_cross_and_separate_ones_do_not():
+    for distance, crosses in ((60.0, True), (101.0, False)):
+        shape = joined(sphere(12), moved(sphere(12), (distance, 3.0, 1.0)))
+        found, edges = crossings(*shape)
+        assert bool(found) == crosses
+        assert edges == len(shape[1]) * 3 // 2
+    assert not crossings(*bust(20))[0]
+
+
+def test_turned_normals():
+    vertices, faces = grid(21)
+    after = vertices.copy()
+    after[:, 2] = vertices[:, 0]  # every face turns by 45 degrees
+    everything = np.ones(len(vertices), dtype=bool)
+    near, elsewhere = normal_changes(vertices, after, faces, everything, np.array([220]))
+    assert near == pytest.approx(45.0) or len(near) == 0
+    assert elsewhere == pytest.approx(45.0)
+    assert len(near) + len(elsewhere) == len(faces)
+
+
+def _comb(z, shift):
+    vertices, faces = grid(21, size=90)
+    return [moved((vertices * [0.12, 1, 1], faces), (x + shift, 0, z)) for x in range(-40, 41, 16)]
+
+
+def _torus(turned):
+    mesh = o3d.geometry.TriangleMesh.create_torus(30, 6, 40, 16)
+    vertices = np.array(mesh.vertices)
+    return (vertices[:, [0, 2, 1]] if turned else vertices), np.array(mesh.triangles, dtype=np.int64)
+
+
+def _stairs():
+    steps = []
+    for i in range(24):
+        vertices, faces = grid(5, size=24)
+        tilted = vertices @ [[1, 0, 0], [0, 0.5, -0.87], [0, 0.87, 0.5]]
+        angle = i * np.pi / 6
+        steps.append(moved((tilted, faces), (30 * np.cos(angle), 4 * i, 30 * np.sin(angle))))
+    return joined(*steps)
+
+
+SCENES = {
+    "plate close behind plate": joined(grid(21), moved(grid(11, size=50), (0, 0, 0.05))),
+    "comb behind comb": joined(grid(31), *_comb(10, 0), *_comb(22, 8)),
+    "interlocked rings": joined(_torus(False), moved(_torus(True), (30, 0, 0))),
+    "staircase": _stairs(),
+    "thin shell": joined(sphere(24), sphere(24, radius=49.8)),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_awkward_scenes_keep_their_order(name):
+    relief = rel.make_relief(to_mesh(SCENES[name]), rel.ReliefParams(k=32))
+    certificate = relief.certificate
+    assert certificate.visible_behind == 0
+    assert certificate.vertex_inversions + certificate.grid_inversions == 0, certificate
+    assert certificate.grid_pairs_tested > 0
+
+
+def test_without_the_guarantees_the_certificate_says_what_is_wrong():
+    paper = rel.make_relief(rel.demo_scene(), rel.ReliefParams.paper()).certificate
+    assert paper.grid_inversions > 1000
+    assert paper.visible_behind > 0
+    assert any("changed places" in sentence for sentence in paper.failures)
+
+
+def test_minimum_gap_survives_compression():
+    scene = to_mesh(SCENES["comb behind comb"])
+    params = rel.ReliefParams(k=16, alpha=0.5, min_gap=1.0)
+    certificate = rel.make_relief(scene, params).certificate
+    assert certificate.gaps_tested > 1000
+    assert certificate.gaps_missed == 0
