@@ -71,7 +71,9 @@ def _stairs():
 
 
 SCENES = {
-    "plate close behind plate": joined(grid(21), moved(grid(11, size=50), (0, 0, 0.05))),
+    "plate close behind plate": joined(
+        grid(21), moved(grid(11, size=50), (0, 0, 20)), moved(grid(7, size=24), (0, 0, 20.05))
+    ),
     "comb behind comb": joined(grid(31), *_comb(10, 0), *_comb(22, 8)),
     "interlocked rings": joined(_torus(False), moved(_torus(True), (30, 0, 0))),
     "staircase": _stairs(),
