@@ -7,6 +7,7 @@ import pytest
 from scipy.sparse.csgraph import connected_components
 
 import o3d_relief as rel
+from shapes import turn
 
 pytestmark = [pytest.mark.data, pytest.mark.slow]
 
@@ -97,3 +98,29 @@ def test_nothing_visible_lies_behind(reliefs, name):
 )
 def test_attributes_survive(reliefs, name, attribute):
     assert getattr(reliefs(name).mesh, f"has_{attribute}")()
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
+@pytest.mark.parametrize("name", ["gargoyle_vertexcolor.ply", "statue_penelope.ply"])
+def test_moved_turned_and_scaled_scenes_give_the_same_relief(reliefs, data_folder, name, scale):
+    relief = reliefs(name)
+    rotation = turn(7)
+    mesh = rel.read_mesh(data_folder / name)
+    size = float(np.ptp(np.asarray(mesh.vertices), axis=0).max())
+    mesh.rotate(rotation, center=(0, 0, 0))
+    mesh.translate(np.array([0.7, -2.0, 1.3]) * size)
+    mesh.scale(scale, center=(0, 0, 0))
+    view = rel.View(front=rotation[:, 2], up=rotation[:, 1])
+    again = rel.make_relief(mesh, rel.ReliefParams(k=128), view=view)
+    assert np.array_equal(again.source_index, relief.source_index)
+    assert (
+        np.abs(np.asarray(again.mesh.vertices) / scale - np.asarray(relief.mesh.vertices)).max()
+        <= 1e-5 * size
+    )
+
+
+@pytest.mark.parametrize("name", ["bust_igea.ply", "lucy_100k.ply", "bunny_zipper.ply"])
+def test_certificate_of_single_bodies_is_clean(reliefs, name):
+    certificate = reliefs(name).certificate
+    assert certificate.failures == []
+    assert certificate.grid_pairs_tested > 50_000
