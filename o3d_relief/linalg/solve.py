@@ -101,13 +101,19 @@ def solve_direct(matrix: sp.csr_array, right_hand_side: NDArray[np.float64]) -> 
     return np.asarray(factor.solve(right_hand_side), dtype=np.float64)
 
 
+def _with_small_indices(matrix: sp.csr_array) -> sp.csr_matrix:
+    """Return a matrix with 32-bit indices: older versions of pyamg know no others."""
+    parts = matrix.data, matrix.indices.astype(np.int32), matrix.indptr.astype(np.int32)
+    return sp.csr_matrix(parts, shape=matrix.shape)
+
+
 def _multigrid(
     matrix: sp.csr_array, right_hand_side: NDArray[np.float64], similar: sp.csr_array, tolerance: float
 ) -> NDArray[np.float64]:
     # "local" weighting bounds the spectral radius row by row; pyamg's default estimates it from a random
     # vector, which would change the last digits from run to run.
     hierarchy = pyamg.smoothed_aggregation_solver(
-        sp.csr_matrix(similar),
+        _with_small_indices(similar),
         strength=None,
         improve_candidates=None,
         smooth=("jacobi", {"weighting": "local"}),
