@@ -40,15 +40,15 @@ from o3d_relief.stages.attenuation import (
 from o3d_relief.stages.clustering import cluster_vertices
 from o3d_relief.stages.compression import alpha_for_depth, compress
 from o3d_relief.stages.construction import construct
-from o3d_relief.stages.perspective import forced_perspective
-from o3d_relief.stages.restoration import (
+from o3d_relief.stages.order_errors import (
     cluster_radii,
     lift_loose,
     lifting_discs,
     order_errors,
-    restore,
     smoothing_discs,
 )
+from o3d_relief.stages.perspective import forced_perspective
+from o3d_relief.stages.restoration import restore
 from o3d_relief.stages.trim import Trimmed, trim_behind
 from o3d_relief.stages.visibility import turned_away, visible_vertices
 

@@ -5,15 +5,15 @@ from scipy.spatial.distance import pdist
 import oracle
 from o3d_relief import cotangent_laplacian
 from o3d_relief.stages.construction import construct
-from o3d_relief.stages.restoration import (
+from o3d_relief.stages.order_errors import (
     cluster_radii,
     depth_order_error,
     lift_loose,
     lifting_discs,
     order_errors,
-    restore,
     smoothing_discs,
 )
+from o3d_relief.stages.restoration import restore
 from shapes import grid, hills, joined, moved
 
 INDEX = np.array([60, 220])

@@ -1,0 +1,215 @@
+"""The words of the command line."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from o3d_relief import __version__
+from o3d_relief.params import ReliefParams, View
+
+__all__ = ["chosen_params", "chosen_view", "parse"]
+
+_POINTS = ("--front", "--up", "--viewpoint", "--vanishing-point")
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$")
+_AXIS = re.compile(r"[+-]?[xyzXYZ]$")
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Understand the words after the program's name.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+
+    Returns
+    -------
+    argparse.Namespace
+        With the name of the command in `command`. Help, version and words that are not understood end the
+        program, the last with one sentence and exit code 2.
+    """
+    return _parser().parse_args(_join_points(list(arguments)))
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser that says what is wrong in one sentence."""
+
+    def error(self, message: str) -> NoReturn:
+        sys.stderr.write(f"{self.prog}: error: {message} (see {self.prog} --help)\n")
+        raise SystemExit(2)
+
+
+def _join_points(arguments: list[str]) -> list[str]:
+    """Join '--front -y', '--front 0 -1 0' and '--front -1,0,0' to one word, which argparse needs."""
+    joined = []
+    position = 0
+    while position < len(arguments):
+        word = arguments[position]
+        following = arguments[position + 1 : position + 4]
+        position += 1
+        if word in _POINTS and following:
+            if len(following) == 3 and all(_NUMBER.match(item) for item in following):
+                word, position = f"{word}={','.join(following)}", position + 3
+            elif _AXIS.match(following[0]) or "," in following[0]:
+                word, position = f"{word}={following[0]}", position + 1
+        joined.append(word)
+    return joined
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(item) for item in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"must be numbers with commas between them. Got {text!r} instead."
+        ) from None
+
+
+def _point(text: str) -> tuple[float, ...]:
+    numbers = _numbers(text)
+    if len(numbers) != 3:
+        raise argparse.ArgumentTypeError(f"must be three numbers. Got {text!r} instead.")
+    return numbers
+
+
+def _direction(text: str) -> str | tuple[float, ...]:
+    if _AXIS.match(text):
+        return text
+    try:
+        return _point(text)
+    except argparse.ArgumentTypeError:
+        raise argparse.ArgumentTypeError(
+            f"must be x, -x, y, -y, z, -z or three numbers. Got {text!r} instead."
+        ) from None
+
+
+def _beta(text: str) -> float | tuple[float, ...]:
+    numbers = _numbers(text)
+    return numbers[0] if len(numbers) == 1 else numbers
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(prog="o3d-relief", description="Make high reliefs from 3D scenes.", allow_abbrev=False)
+    parser.add_argument("--version", action="version", version=f"o3d-relief {__version__}")
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND", dest="command")
+
+    make = commands.add_parser(
+        "make", help="make a relief of a mesh file", description="Make a relief of a mesh file."
+    )
+    make.add_argument("input", type=Path, metavar="INPUT", help="PLY, OBJ, STL, OFF, GLB or glTF file")
+    make.add_argument("output", type=Path, metavar="OUTPUT", help="PLY, OBJ, STL or GLB file")
+    _add_view(make)
+    _add_params(make)
+    make.add_argument(
+        "--report", type=Path, metavar="FILE.json", help="write parameters, counts, times and depths"
+    )
+    make.add_argument("--stages", type=Path, metavar="DIR", help="write a picture of each stage")
+    make.add_argument(
+        "--strict", action="store_true", help="refuse a relief that does not keep what the certificate tests"
+    )
+
+    demo = commands.add_parser(
+        "demo",
+        help="make a relief of the built-in scene, with pictures",
+        description="Make a relief of the built-in scene, with a picture of each stage and a sheet of views.",
+    )
+    demo.add_argument(
+        "directory",
+        type=Path,
+        nargs="?",
+        default=Path("relief-demo"),
+        metavar="DIR",
+        help="default: %(default)s",
+    )
+    return parser
+
+
+def _add_view(command: argparse.ArgumentParser) -> None:
+    group = command.add_argument_group("view", "directions are x, -x, y, ... or three numbers")
+    group.add_argument(
+        "--front",
+        type=_direction,
+        default="z",
+        metavar="DIR",
+        help="from the scene to the viewer (default: z)",
+    )
+    group.add_argument("--up", type=_direction, default="y", metavar="DIR", help="default: y")
+    group.add_argument(
+        "--viewpoint", type=_point, metavar="X Y Z",
+        help="what is visible is seen from here, in relief units (default: infinitely far)",
+    )  # fmt: skip
+    group.add_argument(
+        "--vanishing-point", type=_point, metavar="X Y Z",
+        help="forced perspective towards this point behind the plane, in relief units (default: none)",
+    )  # fmt: skip
+
+
+def _add_params(command: argparse.ArgumentParser) -> None:
+    default = ReliefParams()
+    group = command.add_argument_group("relief")
+    add = group.add_argument
+    add("-k", type=int, default=default.k, metavar="N", help="attenuation points (default: %(default)s)")
+    add("--beta", type=_beta, default=default.beta, metavar="B[,B...]",
+        help="attenuation factor, one or one per point (default: %(default)s)")  # fmt: skip
+    for name, text in (
+        ("discard_above", "t1: drop points with a larger relative differential"),
+        ("attach_below", "t2: attach points with a smaller relative differential"),
+        ("max_order_error", "t3: solve vertices with a larger depth order error again"),
+        ("blend", "t: share of first order differentials there"),
+    ):
+        add(f"--{name.replace('_', '-')}", type=float, default=getattr(default, name), metavar="T",
+            help=f"{text} (default: %(default)s)")  # fmt: skip
+    add("--no-smooth-points", dest="smooth_points", action="store_false",
+        help="the paper's own restoration, without smoothing around the points")  # fmt: skip
+    add("--no-in-front", dest="in_front", action="store_false",
+        help="the paper's own behaviour: visible parts may end behind the plane and are trimmed")  # fmt: skip
+    add("--no-in-order", dest="in_order", action="store_false",
+        help="the paper's own behaviour: parts may pass through each other")  # fmt: skip
+    add("--min-gap", type=float, default=default.min_gap, metavar="G",
+        help="smallest gap in depth between parts, in the input's unit (default: %(default)s)")  # fmt: skip
+    add("--alpha", type=float, metavar="A", help="largest compression ratio (default: no compression)")
+    add("--alpha-min", type=float, metavar="A", help="smallest compression ratio (default: half of alpha)")
+    add("--depth", type=float, metavar="D", help="exact depth in the input's unit, instead of alpha")
+    add("--seed", type=int, default=default.seed, metavar="N", help="default: %(default)s")
+
+
+def chosen_view(options: argparse.Namespace) -> View:
+    """Return the view that was asked for.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        Of the command "make".
+
+    Raises
+    ------
+    ParameterError
+        A value out of its range.
+    """
+    return View(
+        front=options.front,
+        up=options.up,
+        viewpoint=options.viewpoint,
+        vanishing_point=options.vanishing_point,
+    )
+
+
+def chosen_params(options: argparse.Namespace) -> ReliefParams:
+    """Return the parameters that were asked for.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        Of the command "make".
+
+    Raises
+    ------
+    ParameterError
+        A value out of its range.
+    """
+    names = ReliefParams.__dataclass_fields__
+    return ReliefParams(**{name: getattr(options, name) for name in names})
