@@ -9,7 +9,8 @@ import open3d as o3d
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from o3d_relief.bounds.pairs import Pairs, grid_pairs, unit_box, vertex_pairs
+from o3d_relief.bounds.pairs import Pairs, grid_pairs, vertex_pairs
+from o3d_relief.rays import unit_box
 
 __all__ = ["Certificate", "certify", "crossings", "inversions", "normal_changes"]
 

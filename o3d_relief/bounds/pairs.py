@@ -15,7 +15,9 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-__all__ = ["Pairs", "grid_pairs", "touching_pairs", "unit_box", "vertex_pairs"]
+from o3d_relief.rays import unit_box
+
+__all__ = ["Pairs", "grid_pairs", "touching_pairs", "vertex_pairs"]
 
 _SAME_PLACE = 1e-3
 """Points of a line that are closer than this, in relief units, are one: rays are cast in float32."""
@@ -82,35 +84,8 @@ class Pairs:
         )
 
 
-def unit_box(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64]
-) -> tuple[o3d.t.geometry.RaycastingScene, NDArray[np.float64], float]:
-    """Build a RaycastingScene around a mesh, brought into the unit box because it computes in float32.
-
-    Parameters
-    ----------
-    vertices : (n, 3) float64
-    faces : (m, 3) int64
-
-    Returns
-    -------
-    scene : RaycastingScene
-    middle : (3,) float64
-    size : float
-        The point p lies at (p - middle) / size in the scene.
-    """
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
-    middle, size = (low + high) / 2, float((high - low).max())
-    scene = o3d.t.geometry.RaycastingScene()
-    scene.add_triangles(
-        o3d.core.Tensor(((vertices - middle) / size).astype(np.float32)),
-        o3d.core.Tensor(faces.astype(np.uint32)),
-    )
-    return scene, middle, size
-
-
 class _UnitBox:
-    """The same with rays of one direction."""
+    """A mesh in the unit box, and rays of one direction through it."""
 
     def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
         self.scene, self.middle, self.size = unit_box(vertices, faces)

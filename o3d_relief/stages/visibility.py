@@ -7,6 +7,7 @@ import open3d as o3d
 from numpy.typing import NDArray
 
 from o3d_relief.errors import ParameterError
+from o3d_relief.rays import unit_box
 
 __all__ = ["turned_away", "visible_vertices"]
 
@@ -49,11 +50,7 @@ def visible_vertices(
             f"viewpoint must lie in front of the scene (z > {front:g} relief units). "
             f"Got z = {viewpoint[2]:g} instead."
         )
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
-    middle, size = (low + high) / 2, float((high - low).max())
-    unit_box = ((vertices - middle) / size).astype(np.float32)
-    scene = o3d.t.geometry.RaycastingScene()
-    scene.add_triangles(o3d.core.Tensor(unit_box), o3d.core.Tensor(faces.astype(np.uint32)))
+    scene, middle, size = unit_box(vertices, faces)
     rays = np.zeros((len(vertices), 6), dtype=np.float32)
     rays[:, 5] = 1.0
     if viewpoint is not None:
@@ -61,7 +58,7 @@ def visible_vertices(
         # Past the scene's front nothing can be hit: unit directions keep the offset of a far u small.
         towards /= np.linalg.norm(towards, axis=1, keepdims=True)
         rays[:, 3:] = towards
-    rays[:, :3] = unit_box + np.float32(_NEAR) * rays[:, 3:]
+    rays[:, :3] = ((vertices - middle) / size).astype(np.float32) + np.float32(_NEAR) * rays[:, 3:]
     occluded = scene.test_occlusions(o3d.core.Tensor(rays))
     return np.asarray(~occluded.numpy().astype(bool))
 
