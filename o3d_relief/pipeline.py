@@ -99,6 +99,7 @@ class Relief:
             relief=welded.vertices,
             relief_faces=welded.faces,
             relief_before=before[first[1:] - 1],
+            relief_parents=scene.welded_index[self.trimmed.parents[welded.face_from]],
             scene=stages["perspective"].vertices,
             scene_faces=scene.faces,
             heights=stages["compression"].z,

@@ -280,6 +280,7 @@ def order_step(
     min_gap = params.min_gap / unit / (0.95 * lowest if ratio < 1.0 else 1.0)
     ordered = keep_order(
         vertices,
+        faces,
         laplacian,
         vertex_areas(vertices, faces),
         z,

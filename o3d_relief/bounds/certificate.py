@@ -5,23 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import open3d as o3d
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
-from o3d_relief.bounds.pairs import Pairs, grid_pairs, vertex_pairs
-from o3d_relief.rays import unit_box
+from o3d_relief.bounds.bends import normal_changes
+from o3d_relief.bounds.crossings import crossings, edges_of
+from o3d_relief.bounds.inversions import inversions
+from o3d_relief.bounds.origin import Origin
+from o3d_relief.bounds.pairs import grid_pairs, upright, vertex_pairs
 
-__all__ = ["Certificate", "certify", "crossings", "inversions", "normal_changes"]
-
-_SAME = 1e-3
-"""Relief units below which float32 rays do not tell two surfaces apart."""
-
-_NEAR = 1.0
-"""A face is near an attenuation point within this distance, in relief units."""
-
-_INSIDE = 1e-3
-"""Share at both ends of an edge that does not count as crossing: there it meets its neighbours."""
+__all__ = ["Certificate", "certify"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,13 +29,17 @@ class Certificate:
         other way round in the scene.
     grid_pairs_tested, grid_inversions : int
         The same for surfaces that follow each other on a grid of 1024 x 1024 lines.
+    old_inversions : int
+        Pairs of both kinds that stand the other way round where their two triangles crossed in the scene
+        already: these do not count as inversions.
     worst_inversion : float
         How far the worst of them stood the other way round in the scene, in relief units.
     gaps_tested, gaps_missed : int
         Pairs that were at least the asked gap apart in the scene, and those that are not in the relief.
     edges_tested, new_crossings, old_crossings : int
         Edges of the relief, pairs of an edge and a triangle that cross in the relief but not in the scene,
-        and pairs that cross in both: an input that intersects itself keeps these.
+        by more than 1e-3 relief units to both sides, and pairs that cross in both: an input that
+        intersects itself keeps these.
     faces_near_points, faces_elsewhere : int
         Visible faces within one relief unit of a kept attenuation point, and the others.
     bend_near_points, bend_elsewhere : float
@@ -58,6 +54,7 @@ class Certificate:
     vertex_inversions: int
     grid_pairs_tested: int
     grid_inversions: int
+    old_inversions: int
     worst_inversion: float
     gaps_tested: int
     gaps_missed: int
@@ -99,122 +96,12 @@ class Certificate:
         return found
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Inversions:
-    tested: int
-    inverted: int
-    worst: float
-    gaps_tested: int
-    gaps_missed: int
-    places: tuple[tuple[float, float], ...]
-
-
-def inversions(
-    vertices: NDArray[np.float64], pairs: Pairs, before: NDArray[np.float64], *, min_gap: float = 0.0
-) -> _Inversions:
-    """Count the pairs of a relief that stood the other way round in the scene.
-
-    Parameters
-    ----------
-    vertices : (n, 3) float64
-        Of the relief, in relief units.
-    pairs : Pairs
-        What is stacked in the relief.
-    before : (n,) float64
-        The z of each vertex in the scene.
-    min_gap : float
-        In relief units.
-
-    Returns
-    -------
-    counts
-    """
-    upper, lower = pairs.heights(before)
-    gap = upper - lower
-    inverted = gap < -_SAME
-    wide = gap >= max(min_gap, _SAME)
-    missed = wide & (pairs.gap < min_gap - _SAME)
-    corners = vertices[pairs.upper[inverted][:10]]
-    middle = np.einsum("pcx,pc->px", corners, pairs.upper_weights[inverted][:10])
-    return _Inversions(
-        tested=len(pairs),
-        inverted=int(inverted.sum()),
-        worst=float(np.abs(gap[inverted]).max(initial=0.0)),
-        gaps_tested=int(wide.sum()),
-        gaps_missed=int(missed.sum()) if min_gap > 0.0 else 0,
-        places=tuple((float(x), float(y)) for x, y, _ in middle),
-    )
-
-
-def crossings(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> tuple[set[tuple[int, int]], int]:
-    """Find the edges that cross triangles of a welded mesh.
-
-    Parameters
-    ----------
-    vertices : (n, 3) float64
-    faces : (m, 3) int64
-
-    Returns
-    -------
-    crossing : set of (edge, face)
-        Edges numbered by their sorted vertices; an edge and a triangle that share a vertex do not count.
-    edges : int
-        Number of edges tested.
-    """
-    edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
-    scene, middle, size = unit_box(vertices, faces)
-    start, end = vertices[edges[:, 0]], vertices[edges[:, 1]]
-    rays = np.concatenate([(start - middle) / size, (end - start) / size], axis=1).astype(np.float32)
-    hits = scene.list_intersections(o3d.core.Tensor(rays))
-    t = hits["t_hit"].numpy()
-    ray = hits["ray_ids"].numpy().astype(np.int64)
-    face = hits["primitive_ids"].numpy().astype(np.int64)
-    inside = (t > _INSIDE) & (t < 1.0 - _INSIDE)
-    ray, face = ray[inside], face[inside]
-    apart = (edges[ray][:, :, None] != faces[face][:, None, :]).all(axis=(1, 2))
-    return set(zip(ray[apart].tolist(), face[apart].tolist(), strict=True)), len(edges)
-
-
-def normal_changes(
-    before: NDArray[np.float64],
-    after: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    visible: NDArray[np.bool_],
-    points: NDArray[np.int64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Measure how far the normals of visible faces have turned.
-
-    Parameters
-    ----------
-    before, after : (n, 3) float64
-    faces : (m, 3) int64
-    visible : (n,) bool
-    points : (q,) int64
-        The kept attenuation points.
-
-    Returns
-    -------
-    near, elsewhere : (a,), (b,) float64
-        Angles in degrees, near the points and elsewhere; faces without an area are left out.
-    """
-    seen = faces[visible[faces].all(axis=1)]
-    one, other = _normals(before[seen]), _normals(after[seen])
-    sizes = np.linalg.norm(one, axis=1) * np.linalg.norm(other, axis=1)
-    cosine = (one * other).sum(axis=1)[sizes > 0.0] / sizes[sizes > 0.0]
-    angle = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
-    distance, _ = cKDTree(before[points]).query(before[seen[sizes > 0.0]].mean(axis=1))
-    return angle[distance <= _NEAR], angle[distance > _NEAR]
-
-
-def _normals(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-
-
 def certify(
     *,
     relief: NDArray[np.float64],
     relief_faces: NDArray[np.int64],
     relief_before: NDArray[np.float64],
+    relief_parents: NDArray[np.int64],
     scene: NDArray[np.float64],
     scene_faces: NDArray[np.int64],
     heights: NDArray[np.float64],
@@ -231,6 +118,8 @@ def certify(
     relief_faces : (m_out, 3) int64
     relief_before : (n_out,) float64
         The z of each of them in the scene.
+    relief_parents : (m_out, 3) int64
+        Vertices of the scene's face that each of the relief's faces is a part of.
     scene : (n, 3) float64
         Welded vertices of the scene, after the forced perspective.
     scene_faces : (m, 3) int64
@@ -245,16 +134,20 @@ def certify(
     -------
     Certificate
     """
-    stacked = {
-        "vertex": inversions(relief, vertex_pairs(relief, relief_faces), relief_before, min_gap=min_gap),
-        "grid": inversions(relief, grid_pairs(relief, relief_faces), relief_before, min_gap=min_gap),
-    }
-    now, edges = crossings(relief, relief_faces)
-    then, _ = crossings(np.column_stack([relief[:, :2], relief_before]), relief_faces)
+    before = np.column_stack([relief[:, :2], relief_before])
+    origin = Origin(relief_faces, relief_parents, scene)
+    # Pairs leave out what stands upright in the relief, and here also what did so in the scene.
+    lying = relief_faces[~upright(before, relief_faces)]
+    low, high = scene.min(axis=0), scene.max(axis=0)
+    stacked = vertex_pairs(relief, lying), grid_pairs(relief, lying, low=low, high=high)
+    both = [inversions(relief, pairs, relief_before, origin, min_gap=min_gap) for pairs in stacked]
+    edges = edges_of(relief_faces)
+    met = crossings(relief, relief_faces, edges)
+    met = met.select(met.pierced(relief[:, 2]))
+    old = met.pierced(relief_before) | origin.crossed(met.edge[:, [0, 1, 1]], met.face)
     near, elsewhere = normal_changes(
         scene, np.column_stack([scene[:, :2], heights]), scene_faces, visible, points
     )
-    both = stacked["vertex"], stacked["grid"]
     return Certificate(
         visible_tested=int(visible.sum()),
         visible_behind=int((heights[visible] < 0.0).sum()),
@@ -262,12 +155,13 @@ def certify(
         vertex_inversions=both[0].inverted,
         grid_pairs_tested=both[1].tested,
         grid_inversions=both[1].inverted,
+        old_inversions=sum(found.crossed for found in both),
         worst_inversion=max(found.worst for found in both),
         gaps_tested=sum(found.gaps_tested for found in both),
         gaps_missed=sum(found.gaps_missed for found in both),
-        edges_tested=edges,
-        new_crossings=len(now - then),
-        old_crossings=len(now & then),
+        edges_tested=len(edges),
+        new_crossings=int((~old).sum()),
+        old_crossings=int(old.sum()),
         faces_near_points=len(near),
         faces_elsewhere=len(elsewhere),
         bend_near_points=float(np.percentile(near, 99)) if len(near) else 0.0,

@@ -17,10 +17,14 @@ from scipy.spatial import cKDTree
 
 from o3d_relief.rays import unit_box
 
-__all__ = ["Pairs", "grid_pairs", "touching_pairs", "vertex_pairs"]
+__all__ = ["Pairs", "foot_pairs", "grid_pairs", "touching_pairs", "upright", "vertex_pairs"]
 
-_SAME_PLACE = 1e-3
+_SAME_PLACE = 5e-4
 """Points of a line that are closer than this, in relief units, are one: rays are cast in float32."""
+
+_UPRIGHT = 0.01
+"""Share of its area at which a triangle, seen from the front, counts as upright: there an error of float32 in
+x and y is one of more than 1e-3 relief units in z."""
 
 _MISS = 0xFFFFFFFF
 
@@ -36,7 +40,7 @@ class Pairs:
     upper_weights, lower_weights : (p, 3) float64
         Barycentric coordinates of the points.
     gap : (p,) float64
-        Distance before, positive.
+        Distance before; positive, or a rounding error off 0 where they touch.
     """
 
     upper: NDArray[np.int64]
@@ -75,13 +79,55 @@ class Pairs:
     @staticmethod
     def join(parts: list[Pairs]) -> Pairs:
         """Put several sets of pairs together."""
+        corners, weights = [np.zeros((0, 3), dtype=np.int64)], [np.zeros((0, 3))]
         return Pairs(
-            upper=np.concatenate([part.upper for part in parts]),
-            upper_weights=np.concatenate([part.upper_weights for part in parts]),
-            lower=np.concatenate([part.lower for part in parts]),
-            lower_weights=np.concatenate([part.lower_weights for part in parts]),
-            gap=np.concatenate([part.gap for part in parts]),
+            upper=np.concatenate(corners + [part.upper for part in parts]),
+            upper_weights=np.concatenate(weights + [part.upper_weights for part in parts]),
+            lower=np.concatenate(corners + [part.lower for part in parts]),
+            lower_weights=np.concatenate(weights + [part.lower_weights for part in parts]),
+            gap=np.concatenate([np.zeros(0)] + [part.gap for part in parts]),
         )
+
+
+def upright(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Find the triangles that stand on S within half a degree: where a line meets them is chance.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+    faces : (m, 3) int64
+
+    Returns
+    -------
+    (m,) bool
+        Those without an area, too.
+    """
+    corners = vertices[faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return np.asarray(np.abs(normal[:, 2]) <= _UPRIGHT * np.linalg.norm(normal, axis=1))
+
+
+class _Borders:
+    """The borders of a mesh, seen from the front: a line that grazes one meets the surface by chance."""
+
+    def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
+        low, high = np.sort(faces[:, [[1, 2], [2, 0], [0, 1]]], axis=2).reshape(-1, 2).T
+        _, edge, count = np.unique(low * len(vertices) + high, return_inverse=True, return_counts=True)
+        self._on_border = count[edge.ravel()].reshape(-1, 3) == 1
+        at_border = np.zeros(len(vertices), dtype=bool)
+        at_border[np.concatenate([low, high])[np.tile(self._on_border.ravel(), 2)]] = True
+        self._corner_on_border = at_border[faces]
+        a, b, c = (vertices[faces[:, i], :2] for i in range(3))
+        area = np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
+        opposite = np.stack([np.linalg.norm(side, axis=1) for side in (c - b, a - c, b - a)], axis=1)
+        self._height = area[:, None] / np.maximum(opposite, np.finfo(np.float64).tiny)
+
+    def grazed(self, triangle: NDArray[np.int64], weights: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Tell which points of triangles, (q,) and (q, 3), lie on a border, to a rounding error."""
+        near = weights * self._height[triangle] < 2 * _SAME_PLACE
+        at_corner = near.sum(axis=1, keepdims=True) - near == 2
+        grazed = (near & self._on_border[triangle]) | (at_corner & self._corner_on_border[triangle])
+        return np.asarray(grazed.any(axis=1))
 
 
 class _UnitBox:
@@ -119,14 +165,19 @@ def vertex_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Pai
     Pairs
         At most 2 n; those closer than 1e-3 relief units are left out.
     """
-    box = _UnitBox(vertices, faces)
+    faces = faces[~upright(vertices, faces)]
+    if len(faces) == 0:
+        return Pairs.join([])
+    box, borders = _UnitBox(vertices, faces), _Borders(vertices, faces)
     found = []
     for direction in (_UP, -_UP):
-        hits = box.scene.cast_rays(box.rays(vertices + 10 * _SAME_PLACE * direction, direction))
-        triangle = hits["primitive_ids"].numpy()
-        hit = np.flatnonzero(triangle != _MISS)
-        other = faces[triangle[hit].astype(np.int64)]
+        hits = box.scene.cast_rays(box.rays(vertices + 2 * _SAME_PLACE * direction, direction))
+        hit = np.flatnonzero(hits["primitive_ids"].numpy() != _MISS)
+        triangle = hits["primitive_ids"].numpy()[hit].astype(np.int64)
         other_weights = _weights(hits["primitive_uvs"].numpy()[hit])
+        # A ray may meet a steep triangle of its own vertex.
+        usable = (faces[triangle] != hit[:, None]).all(axis=1) & ~borders.grazed(triangle, other_weights)
+        hit, other, other_weights = hit[usable], faces[triangle[usable]], other_weights[usable]
         own, own_weights = _corners(hit)
         if direction[2] > 0:
             found.append(_pairs(vertices[:, 2], other, other_weights, own, own_weights))
@@ -135,7 +186,14 @@ def vertex_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Pai
     return Pairs.join(found)
 
 
-def grid_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64], *, side: int = 1024) -> Pairs:
+def grid_pairs(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    *,
+    side: int = 1024,
+    low: NDArray[np.float64] | None = None,
+    high: NDArray[np.float64] | None = None,
+) -> Pairs:
     """Pair the points that follow each other on the lines of a regular grid.
 
     Parameters
@@ -145,34 +203,85 @@ def grid_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64], *, side:
     faces : (m, 3) int64
     side : int
         Number of lines along x and along y.
+    low, high : (3,) float64, optional
+        Corners of the box that the grid covers, that of the vertices where omitted.
 
     Returns
     -------
     Pairs
-        Those closer than 1e-3 relief units are left out.
+        Neighbours on the surface, which meet where the line passes, are left out. The gap of surfaces that
+        touch is known to a rounding error only, and may be a little less than 0.
     """
+    faces = faces[~upright(vertices, faces)]
+    if len(faces) == 0:
+        return Pairs.join([])
     box = _UnitBox(vertices, faces)
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    low = vertices.min(axis=0) if low is None else low
+    high = vertices.max(axis=0) if high is None else high
     steps = (np.arange(side) + 0.5) / side
     x, y = np.meshgrid(low[0] + steps * (high[0] - low[0]), low[1] + steps * (high[1] - low[1]))
-    start = np.stack([x.ravel(), y.ravel(), np.full(side * side, low[2] - 0.01 * box.size)], axis=1)
+    start = np.stack(
+        [x.ravel(), y.ravel(), np.full(side * side, vertices[:, 2].min() - 0.01 * box.size)], axis=1
+    )
     hits = box.scene.list_intersections(box.rays(start, _UP))
-    line = hits["ray_ids"].numpy().astype(np.int64)
-    t = hits["t_hit"].numpy().astype(np.float64)
+    triangle = hits["primitive_ids"].numpy().astype(np.int64)
+    weights = _weights(hits["primitive_uvs"].numpy())
+    usable = np.flatnonzero(~_Borders(vertices, faces).grazed(triangle, weights))
+    triangle, weights = triangle[usable], weights[usable]
+    line = hits["ray_ids"].numpy()[usable].astype(np.int64)
+    t = hits["t_hit"].numpy()[usable].astype(np.float64)
     # One sort by line and height on it: t is well below the factor's size, and float64 has room for both.
     order = np.argsort(line + t / (4.0 * max(float(t.max(initial=0.0)), 1.0)), kind="stable")
-    line, t = line[order], t[order]
-    following = np.flatnonzero((line[1:] == line[:-1]) & ((t[1:] - t[:-1]) * box.size > _SAME_PLACE))
+    following = np.flatnonzero(line[order][1:] == line[order][:-1])
     lower, upper = order[following], order[following + 1]
-    triangle = hits["primitive_ids"].numpy()
-    uv = hits["primitive_uvs"].numpy()
     return _pairs(
-        vertices[:, 2],
-        faces[triangle[upper].astype(np.int64)],
-        _weights(uv[upper]),
-        faces[triangle[lower].astype(np.int64)],
-        _weights(uv[lower]),
+        vertices[:, 2], faces[triangle[upper]], weights[upper], faces[triangle[lower]], weights[lower]
     )
+
+
+def foot_pairs(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    edges: NDArray[np.int64],
+    z: NDArray[np.float64],
+) -> Pairs:
+    """Pair the points where edges pass through S with the next surface above, once the vertices have moved.
+
+    There the trim makes new vertices.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+        Before.
+    faces : (m, 3) int64
+    edges : (e, 2) int64
+    z : (n,) float64
+        Heights after.
+
+    Returns
+    -------
+    Pairs
+        Those that changed places; upper and lower as they were before.
+    """
+    lying = faces[~upright(np.column_stack([vertices[:, :2], z]), faces) & ~upright(vertices, faces)]
+    edges = edges[z[edges].prod(axis=1) < 0.0]
+    if len(edges) == 0 or len(lying) == 0:
+        return Pairs.join([])
+    share = z[edges[:, 0]] / (z[edges[:, 0]] - z[edges[:, 1]])
+    foot = vertices[edges[:, 0]] + share[:, None] * (vertices[edges[:, 1]] - vertices[edges[:, 0]])
+    foot[:, 2] = 2 * _SAME_PLACE
+    moved = np.column_stack([vertices[:, :2], z])
+    box, borders = _UnitBox(moved, lying), _Borders(moved, lying)
+    hits = box.scene.cast_rays(box.rays(foot, _UP))
+    hit = np.flatnonzero(hits["primitive_ids"].numpy() != _MISS)
+    triangle = hits["primitive_ids"].numpy()[hit].astype(np.int64)
+    weights = _weights(hits["primitive_uvs"].numpy()[hit])
+    own = (lying[triangle][:, :, None] == edges[hit][:, None, :]).any(axis=1).all(axis=1)
+    usable = ~own & ~borders.grazed(triangle, weights)
+    hit, other, other_weights = hit[usable], lying[triangle[usable]], weights[usable]
+    corners = edges[hit][:, [0, 1, 1]]
+    at_foot = np.stack([1.0 - share[hit], share[hit], np.zeros(len(hit))], axis=1)
+    return _pairs(vertices[:, 2], corners, at_foot, other, other_weights)
 
 
 def touching_pairs(
@@ -257,4 +366,7 @@ def _pairs(
     everything = Pairs(
         upper=upper, upper_weights=upper_weights, lower=lower, lower_weights=lower_weights, gap=gap
     )
-    return everything.select(gap > _SAME_PLACE)
+    close = gap <= _SAME_PLACE
+    neighbours = np.zeros(len(gap), dtype=bool)
+    neighbours[close] = (upper[close][:, :, None] == lower[close][:, None, :]).any(axis=(1, 2))
+    return everything.select((gap > -_SAME_PLACE) & ~neighbours)

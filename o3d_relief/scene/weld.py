@@ -25,6 +25,8 @@ class Welded:
     faces : (m, 3) int64
     index : (n_in,) int64
         Welded vertex of each input vertex, -1 where no kept face uses it.
+    face_from : (m,) int64
+        Input face of each face.
     merged_vertices, unreferenced_vertices, degenerate_faces, duplicate_faces : int
         What was set aside.
     """
@@ -32,6 +34,7 @@ class Welded:
     vertices: NDArray[np.float64]
     faces: NDArray[np.int64]
     index: NDArray[np.int64]
+    face_from: NDArray[np.int64]
     merged_vertices: int
     unreferenced_vertices: int
     degenerate_faces: int
@@ -87,7 +90,8 @@ def weld(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Welded:
     whole = (a != b) & (b != c) & (c != a)
     candidates = merged[whole]
     same = first_of_equal_rows(np.sort(candidates, axis=1).astype(np.float64))
-    kept = candidates[same == np.arange(len(same))]
+    first_time = same == np.arange(len(same))
+    kept = candidates[first_time]
     used = np.zeros(len(vertices), dtype=bool)
     used[kept] = True
     number = np.where(used, np.cumsum(used) - 1, -1)
@@ -96,6 +100,7 @@ def weld(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Welded:
         vertices=vertices[used],
         faces=number[kept],
         index=index,
+        face_from=np.flatnonzero(whole)[first_time],
         merged_vertices=int((first != np.arange(len(first))).sum()),
         unreferenced_vertices=int((index < 0).sum()),
         degenerate_faces=int((~whole).sum()),

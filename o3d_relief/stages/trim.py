@@ -26,6 +26,8 @@ class Trimmed:
         Share of the second of them.
     face_from : (m_out,) int64
         Input face of each output face.
+    parents : (m_out, 3) int64
+        The input vertices of that face.
     faces_cut, faces_dropped : int
     """
 
@@ -35,6 +37,7 @@ class Trimmed:
     vertex_from: NDArray[np.int64]
     vertex_share: NDArray[np.float64]
     face_from: NDArray[np.int64]
+    parents: NDArray[np.int64]
     faces_cut: int
     faces_dropped: int
 
@@ -113,6 +116,7 @@ def trim_behind(
         vertex_from=np.concatenate([np.stack([itself, itself], axis=1), edges])[used],
         vertex_share=np.concatenate([np.zeros(len(vertices)), share])[used],
         face_from=face_from,
+        parents=faces[face_from],
         faces_cut=len(straddling),
         faces_dropped=len(faces) - len(uncut) - len(straddling),
     )

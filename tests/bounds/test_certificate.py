@@ -3,50 +3,7 @@ import open3d as o3d
 import pytest
 
 import o3d_relief as rel
-from o3d_relief.bounds.certificate import crossings, inversions, normal_changes
-from o3d_relief.bounds.pairs import grid_pairs, vertex_pairs
-from shapes import bust, grid, joined, moved, sphere, to_mesh
-
-
-def test_swapped_plates_are_inverted_and_others_are_not():
-    scene, faces = joined(grid(11), moved(grid(5, size=40), (0, 0, 10)))
-    relief = scene.copy()
-    relief[121:, 2] = -3.0
-    for pairs in (vertex_pairs(relief, faces), grid_pairs(relief, faces, side=64)):
-        found = inversions(relief, pairs, scene[:, 2])
-        assert found.inverted == found.tested > 0
-        assert found.worst == pytest.approx(10.0, abs=1e-3)
-        assert all(abs(x) <= 20 and abs(y) <= 20 for x, y in found.places)
-        assert inversions(relief, pairs, relief[:, 2]).inverted == 0
-
-
-def test_gaps_that_became_too_small_are_counted():
-    scene, faces = joined(grid(11), moved(grid(5, size=40), (0, 0, 10)))
-    relief = scene * [1, 1, 0.1]
-    pairs = grid_pairs(relief, faces, side=64)
-    assert inversions(relief, pairs, scene[:, 2], min_gap=2.0).gaps_missed == len(pairs)
-    assert inversions(relief, pairs, scene[:, 2], min_gap=0.5).gaps_missed == 0
-    assert inversions(relief, pairs, relief[:, 2], min_gap=2.0).gaps_tested == 0
-
-
-def test_crossing_balls_cross_and_separate_ones_do_not():
-    for distance, crosses in ((60.0, True), (101.0, False)):
-        shape = joined(sphere(12), moved(sphere(12), (distance, 3.0, 1.0)))
-        found, edges = crossings(*shape)
-        assert bool(found) == crosses
-        assert edges == len(shape[1]) * 3 // 2
-    assert not crossings(*bust(20))[0]
-
-
-def test_turned_normals():
-    vertices, faces = grid(21)
-    after = vertices.copy()
-    after[:, 2] = vertices[:, 0]  # every face turns by 45 degrees
-    everything = np.ones(len(vertices), dtype=bool)
-    near, elsewhere = normal_changes(vertices, after, faces, everything, np.array([220]))
-    assert near == pytest.approx(45.0) or len(near) == 0
-    assert elsewhere == pytest.approx(45.0)
-    assert len(near) + len(elsewhere) == len(faces)
+from shapes import grid, joined, moved, sphere, to_mesh
 
 
 def _comb(z, shift):

@@ -1,0 +1,171 @@
+"""Edges that pierce triangles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import open3d as o3d
+from numpy.typing import NDArray
+
+from o3d_relief.bounds.pairs import Pairs
+from o3d_relief.rays import unit_box
+
+__all__ = ["Crossings", "crossings", "edges_of"]
+
+_DEEP = 1e-3
+"""An edge pierces a triangle where it reaches at least this far, in relief units, to both of its sides and,
+seen from the front, away from its border: less is what float32 rays cannot tell from contact."""
+
+_INSIDE = 1e-4
+"""Share at both ends of an edge that does not count as crossing: there it meets its neighbours."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Crossings:
+    """Edges and triangles that may cross, and the stretch of each edge above or below its triangle.
+
+    Attributes
+    ----------
+    edge : (c, 2) int64
+    face : (c, 3) int64
+    along : (c, 2) float64
+        Where the stretch begins and ends, as shares of the edge.
+    inside : (c, 2, 3) float64
+        Barycentric coordinates of the triangle there.
+    """
+
+    edge: NDArray[np.int64]
+    face: NDArray[np.int64]
+    along: NDArray[np.float64]
+    inside: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.edge)
+
+    def gaps(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the height of the edge above the triangle at both ends of the stretch, (c, 2)."""
+        first, last = z[self.edge].T[:, :, None]
+        on_edge = first + self.along * (last - first)
+        return np.asarray(on_edge - np.einsum("cek,ck->ce", self.inside, z[self.face]))
+
+    def pierced(self, z: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Find those that cross for the vertex heights z, (c,)."""
+        gaps = self.gaps(z)
+        return np.asarray((gaps.min(axis=1) < -_DEEP) & (gaps.max(axis=1) > _DEEP))
+
+    def pairs(self, before: NDArray[np.float64], after: NDArray[np.float64]) -> Pairs:
+        """Return both ends of the stretches as pairs that were in order before.
+
+        Parameters
+        ----------
+        before : (n,) float64
+            Heights for which none of them cross. Where edge and triangle touch, `after` tells which of the
+            two counts as the upper one.
+        after : (n,) float64
+
+        Returns
+        -------
+        Pairs
+            Two for each; the gap of those that touch is 0 or a little less.
+        """
+        gap = self.gaps(before)
+        middle = gap.sum(axis=1)
+        touching = np.abs(gap).max(axis=1) <= _DEEP
+        middle = np.where(touching, self.gaps(after).sum(axis=1), middle)
+        # The end that is further off tells the side: the other one lies within a rounding error of it.
+        furthest = np.take_along_axis(gap, np.abs(gap).argmax(axis=1)[:, None], axis=1)[:, 0]
+        edge_above = np.repeat(np.where(touching, middle, furthest) >= 0.0, 2)
+        edge_corners = np.repeat(self.edge[:, [0, 1, 1]], 2, axis=0)
+        along = self.along.ravel()
+        edge_weights = np.stack([1.0 - along, along, np.zeros_like(along)], axis=1)
+        face_corners = np.repeat(self.face, 2, axis=0)
+        face_weights = self.inside.reshape(-1, 3)
+        above = edge_above[:, None]
+        return Pairs(
+            upper=np.where(above, edge_corners, face_corners),
+            upper_weights=np.where(above, edge_weights, face_weights),
+            lower=np.where(above, face_corners, edge_corners),
+            lower_weights=np.where(above, face_weights, edge_weights),
+            gap=np.where(edge_above, gap.ravel(), -gap.ravel()),
+        )
+
+    def select(self, chosen: NDArray[np.bool_]) -> Crossings:
+        """Return some of them."""
+        return Crossings(
+            edge=self.edge[chosen],
+            face=self.face[chosen],
+            along=self.along[chosen],
+            inside=self.inside[chosen],
+        )
+
+
+def edges_of(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the edges of a mesh, (e, 2), each once, by their vertices in rising order."""
+    low, high = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1).T
+    n = int(high.max(initial=0)) + 1
+    return np.stack(np.divmod(np.unique(low * n + high), n), axis=1)
+
+
+def crossings(vertices: NDArray[np.float64], faces: NDArray[np.int64], edges: NDArray[np.int64]) -> Crossings:
+    """Find the edges that meet triangles of a welded mesh from one side to the other.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+        In relief units.
+    faces : (m, 3) int64
+    edges : (e, 2) int64
+        See `edges_of`.
+
+    Returns
+    -------
+    Crossings
+        Candidates found by rays in float32; `Crossings.pierced` tells exactly. An edge and a triangle that
+        share a vertex do not count, nor do triangles that stand upright on S: nothing is above them.
+    """
+    scene, middle, size = unit_box(vertices, faces)
+    start, end = vertices[edges[:, 0]], vertices[edges[:, 1]]
+    rays = np.concatenate([(start - middle) / size, (end - start) / size], axis=1).astype(np.float32)
+    # Whether a ray meets anything between its ends is known fast; where, takes its whole line.
+    meets = scene.test_occlusions(o3d.core.Tensor(rays), tnear=_INSIDE, tfar=1.0 - _INSIDE).numpy()
+    candidates = np.flatnonzero(meets)
+    if len(candidates) == 0:  # Open3D dies of a list without rays
+        none = np.zeros(0, dtype=np.int64)
+        return _stretches(vertices[:, :2], edges[none], faces[none])
+    hits = scene.list_intersections(o3d.core.Tensor(rays[candidates]))
+    t = hits["t_hit"].numpy()
+    ray = candidates[hits["ray_ids"].numpy().astype(np.int64)]
+    triangle = hits["primitive_ids"].numpy().astype(np.int64)
+    inside = (t > _INSIDE) & (t < 1.0 - _INSIDE)
+    edge, face = edges[ray[inside]], faces[triangle[inside]]
+    apart = (edge[:, :, None] != face[:, None, :]).all(axis=(1, 2))
+    return _stretches(vertices[:, :2], edge[apart], face[apart])
+
+
+def _stretches(plane: NDArray[np.float64], edge: NDArray[np.int64], face: NDArray[np.int64]) -> Crossings:
+    """Clip each edge, seen from the front, to its triangle."""
+    a, b, c = (plane[face[:, i]] for i in range(3))
+    area = _cross(b - a, c - a)
+    safe = np.where(area == 0.0, 1.0, area)
+    at_ends = []
+    for end in (0, 1):
+        p = plane[edge[:, end]]
+        second, third = _cross(p - a, c - a) / safe, _cross(b - a, p - a) / safe
+        at_ends.append(np.stack([1.0 - second - third, second, third], axis=1))
+    first, change = at_ends[0], at_ends[1] - at_ends[0]
+    moving = change != 0.0
+    zero = -first / np.where(moving, change, 1.0)
+    begin = np.where(moving & (change > 0.0), zero, 0.0).max(axis=1).clip(0.0, 1.0)
+    finish = np.where(moving & (change < 0.0), zero, 1.0).min(axis=1).clip(0.0, 1.0)
+    along = np.stack([begin, finish], axis=1)
+    inside = first[:, None, :] + along[:, :, None] * change[:, None, :]
+    opposite = np.stack([np.linalg.norm(d, axis=1) for d in (c - b, a - c, b - a)], axis=1)
+    heights = np.abs(area)[:, None] / np.maximum(opposite, np.finfo(np.float64).tiny)
+    from_border = (inside.mean(axis=1) * heights).min(axis=1)
+    everything = Crossings(edge=edge, face=face, along=along, inside=inside)
+    return everything.select((begin <= finish) & (from_border > _DEEP))
+
+
+def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])

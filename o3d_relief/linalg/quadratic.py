@@ -1,0 +1,73 @@
+"""Quadratic forms under linear inequalities."""
+
+from __future__ import annotations
+
+import clarabel
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+__all__ = ["minimise"]
+
+_TOLERANCE = 1e-6
+_FOUND = (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved)
+
+
+def minimise(
+    form: sp.csr_array,
+    pull: NDArray[np.float64],
+    rows: sp.csr_array,
+    least: NDArray[np.float64],
+) -> NDArray[np.float64] | None:
+    """Minimise a quadratic form subject to linear inequalities.
+
+    minimise  1/2 x' A x - b' x   subject to   G x >= h
+
+    by the interior point method of Clarabel, whose steps are sparse factorisations on one thread: the
+    result does not depend on the number of threads.
+
+    Parameters
+    ----------
+    form : (n, n) sparse float64
+        A, symmetric positive definite.
+    pull : (n,) float64
+        b.
+    rows : (m, n) sparse float64
+        G.
+    least : (m,) float64
+        h.
+
+    Returns
+    -------
+    (n,) float64 or None
+        None where no x fulfils all inequalities, or none was found. They hold up to about 1e-5.
+
+    Examples
+    --------
+    The point nearest to the origin with x + y >= 2:
+
+    >>> one = sp.csr_array(np.eye(2))
+    >>> minimise(one, np.zeros(2), sp.csr_array([[1.0, 1.0]]), np.array([2.0])).round(6).tolist()
+    [1.0, 1.0]
+    """
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.direct_solve_method = "qdldl"
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = _TOLERANCE
+    solver = clarabel.DefaultSolver(
+        _columns(sp.triu(form)),
+        -pull,
+        _columns(-rows),
+        -least,
+        [clarabel.NonnegativeConeT(len(least))],
+        settings,
+    )
+    solution = solver.solve()
+    if solution.status not in _FOUND:
+        return None
+    return np.array(solution.x, dtype=np.float64)
+
+
+def _columns(matrix: sp.sparray) -> sp.csc_matrix:
+    """Return a matrix by columns, as Clarabel takes it."""
+    return sp.csc_matrix(matrix)

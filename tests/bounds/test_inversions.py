@@ -1,0 +1,44 @@
+import pytest
+
+from o3d_relief.bounds.inversions import inversions
+from o3d_relief.bounds.origin import Origin
+from o3d_relief.bounds.pairs import grid_pairs, vertex_pairs
+from shapes import grid, joined, moved
+
+
+def _plates():
+    scene, faces = joined(grid(11), moved(grid(5, size=40), (0, 0, 10)))
+    return scene, faces, Origin(faces, faces, scene)
+
+
+def test_swapped_plates_are_inverted_and_others_are_not():
+    scene, faces, origin = _plates()
+    relief = scene.copy()
+    relief[121:, 2] = -3.0
+    for pairs in (vertex_pairs(relief, faces), grid_pairs(relief, faces, side=64)):
+        found = inversions(relief, pairs, scene[:, 2], origin)
+        assert found.inverted == found.tested > 0
+        assert found.crossed == 0
+        assert found.worst == pytest.approx(10.0, abs=1e-3)
+        assert all(abs(x) <= 20 and abs(y) <= 20 for x, y in found.places)
+        assert inversions(relief, pairs, relief[:, 2], origin).inverted == 0
+
+
+def test_what_crossed_in_the_scene_does_not_count():
+    wall, tilted = grid(2), moved(grid(2, size=40), (0, 0, 0))
+    tilted = tilted[0] + [[0, 0, x] for x, _, _ in tilted[0]], tilted[1]  # half of it behind the wall
+    scene, faces = joined(wall, tilted)
+    relief = scene * [1, 1, -1]
+    pairs = grid_pairs(relief, faces, side=64)
+    found = inversions(relief, pairs, scene[:, 2], Origin(faces, faces, scene))
+    assert found.inverted == 0
+    assert found.crossed == len(pairs) > 100
+
+
+def test_gaps_that_became_too_small_are_counted():
+    scene, faces, origin = _plates()
+    relief = scene * [1, 1, 0.1]
+    pairs = grid_pairs(relief, faces, side=64)
+    assert inversions(relief, pairs, scene[:, 2], origin, min_gap=2.0).gaps_missed == len(pairs)
+    assert inversions(relief, pairs, scene[:, 2], origin, min_gap=0.5).gaps_missed == 0
+    assert inversions(relief, pairs, relief[:, 2], origin, min_gap=2.0).gaps_tested == 0
