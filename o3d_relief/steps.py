@@ -40,6 +40,7 @@ from o3d_relief.stages.attenuation import (
 from o3d_relief.stages.clustering import cluster_vertices
 from o3d_relief.stages.compression import alpha_for_depth, compress
 from o3d_relief.stages.construction import construct
+from o3d_relief.stages.floor import lowest_heights
 from o3d_relief.stages.order_errors import (
     cluster_radii,
     lift_loose,
@@ -51,6 +52,9 @@ from o3d_relief.stages.perspective import forced_perspective
 from o3d_relief.stages.restoration import restore
 from o3d_relief.stages.trim import Trimmed, trim_behind
 from o3d_relief.stages.visibility import turned_away, visible_vertices
+
+_KEPT_ON_PLANE = 0.2
+"""Share of its height above its surroundings that what is visible keeps where it would be pressed onto S."""
 
 _ON_PLANE = 1e-9
 """Heights within this of S, in relief units, lie on it: rounding errors leave no slivers at the cut."""
@@ -250,12 +254,12 @@ def restoration_step(
         high |= smoothing_discs(vertices, index, radii)
     if params.in_front:
         high |= lifting_discs(vertices, z, label, visible)
-    bounded = visible if params.in_front else None
-    restored = restore(vertices, laplacian, z, high, index, label, blend=params.blend, in_front=bounded)
+    floor = lowest_heights(vertices, visible, share=_KEPT_ON_PLANE) if params.in_front else None
+    restored = restore(vertices, laplacian, z, high, index, label, blend=params.blend, floor=floor)
     counts |= {
         "solved": int(restored.solved.sum()),
         "points_held": restored.points_held,
-        "set_on_plane": restored.set_on_plane,
+        "set_on_floor": restored.set_on_floor,
         "rounds": restored.rounds,
         "visible_behind": _behind(restored.z, visible),
     }

@@ -143,7 +143,7 @@ def test_paper_s_own_rules_leave_some_behind(mesh):
     solved = stages["restoration"].solved
     assert np.array_equal(solved, stages["restoration"].order_error >= 0.2)
     assert stages["restoration"].counts["visible_behind"] > 0
-    assert stages["restoration"].counts["set_on_plane"] == 0
+    assert stages["restoration"].counts["set_on_floor"] == 0
 
 
 def test_x_and_y_stay_where_they_are(relief, mesh):

@@ -12,8 +12,8 @@ from o3d_relief.linalg.solve import solve_spd
 
 __all__ = ["Restoration", "restore"]
 
-_BEHIND = 1e-6
-"""Relief units behind S that count as on it while the active set is sought; the result is set onto S."""
+_BELOW = 1e-6
+"""Relief units below the floor that count as on it in the search; the result is set onto it."""
 
 _ROUNDS = 30
 
@@ -29,8 +29,8 @@ class Restoration:
         The vertices that were solved again.
     points_held : int
         Fixed points that stayed fixed because nothing else held their component.
-    set_on_plane : int
-        Vertices that were set onto S.
+    set_on_floor : int
+        Vertices that came to lie as low as they may.
     rounds : int
         Linear systems solved.
     """
@@ -38,7 +38,7 @@ class Restoration:
     z: NDArray[np.float64]
     solved: NDArray[np.bool_]
     points_held: int
-    set_on_plane: int
+    set_on_floor: int
     rounds: int
 
 
@@ -51,7 +51,7 @@ def restore(
     label: NDArray[np.int32],
     *,
     blend: float = 0.9,
-    in_front: NDArray[np.bool_] | None = None,
+    floor: NDArray[np.float64] | None = None,
 ) -> Restoration:
     """Solve the vertices with high errors again, Appendix VI.
 
@@ -62,8 +62,8 @@ def restore(
     construction it is solved for the displacement.
 
     The fixed points held the surface in front of S; set free, some of it would sink behind. Where
-    `in_front` is given the system is therefore solved as the minimum of its quadratic form subject to
-    z'' >= 0 there (an obstacle problem), by a primal-dual active set.
+    a floor is given the system is therefore solved as the minimum of its quadratic form subject to
+    z'' >= floor (an obstacle problem), by a primal-dual active set.
 
     Parameters
     ----------
@@ -81,8 +81,9 @@ def restore(
         Connected component of each vertex; one without a fixed point is left as it is.
     blend : float
         t in [0, 1], the share of first order differentials.
-    in_front : (n,) bool, optional
-        Vertices that must not end behind S, if they are solved again; none where omitted.
+    floor : (n,) float64, optional
+        How low the vertices that are solved again may come to lie; minus infinity, or omitted, for any
+        height.
 
     Returns
     -------
@@ -103,39 +104,42 @@ def restore(
     has_point[label[index]] = True
     solved &= has_point[label]
 
-    bounded = np.zeros(len(z), dtype=bool) if in_front is None else in_front & solved
+    lowest = np.where(solved, -np.inf if floor is None else floor, -np.inf)
     system = _System(laplacian, np.flatnonzero(solved), blend)
-    result, on_plane, rounds = _in_front(system, vertices[:, 2], z, bounded)
+    result, on_floor, rounds = _above_floor(system, vertices[:, 2], z, lowest)
     return Restoration(
         z=result,
         solved=solved,
         points_held=len(held),
-        set_on_plane=int(on_plane.sum()),
+        set_on_floor=int(on_floor.sum()),
         rounds=rounds,
     )
 
 
-def _in_front(
-    system: _System, original: NDArray[np.float64], z: NDArray[np.float64], bounded: NDArray[np.bool_]
+def _above_floor(
+    system: _System,
+    original: NDArray[np.float64],
+    z: NDArray[np.float64],
+    floor: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_], int]:
-    """Solve subject to z >= 0 on `bounded`; return the heights, the vertices on the bound, the rounds."""
-    on_plane = np.zeros(len(z), dtype=bool)
+    """Solve subject to z >= floor; return the heights, the vertices on the floor, the rounds."""
+    on_floor = np.zeros(len(z), dtype=bool)
     rounds = 0
     while True:
-        result, force = system.solve(original, np.where(on_plane, 0.0, z), on_plane)
+        result, force = system.solve(original, np.where(on_floor, floor, z), on_floor)
         rounds += 1
-        behind = bounded & ~on_plane & (result < -_BEHIND)
-        # A vertex that is pulled towards S, not held off it, is let go.
-        released = on_plane & (force < 0.0)
-        if not behind.any() and not released.any():
+        below = ~on_floor & (result < floor - _BELOW)
+        # A vertex that is pulled towards the floor, not held off it, is let go.
+        released = on_floor & (force < 0.0)
+        if not below.any() and not released.any():
             break
         if rounds > _ROUNDS:
             # The active set goes round in a circle: from here on it only grows, and so comes to an end.
             released[:] = False
-            if not behind.any():
+            if not below.any():
                 break
-        on_plane = (on_plane & ~released) | behind
-    return np.where(bounded, np.maximum(result, 0.0), result), on_plane, rounds
+        on_floor = (on_floor & ~released) | below
+    return np.maximum(result, floor), on_floor, rounds
 
 
 class _System:

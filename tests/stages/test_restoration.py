@@ -60,19 +60,36 @@ def _sunk():
 
 def test_nothing_visible_ends_behind_the_plane():
     vertices, laplacian, z = _sunk()
-    everywhere = np.ones(len(z), dtype=bool)
-    high = lifting_discs(vertices, z, _one_part(len(z)), everywhere)
-    found = restore(vertices, laplacian, z, high, np.array([0]), _one_part(len(z)), in_front=everywhere)
+    high = lifting_discs(vertices, z, _one_part(len(z)), np.ones(len(z), dtype=bool))
+    plane = np.zeros(len(z))
+    found = restore(vertices, laplacian, z, high, np.array([0]), _one_part(len(z)), floor=plane)
     assert (found.z >= 0).all()
     assert np.array_equal(found.z[~high], z[~high])
 
 
+def test_nothing_ends_below_its_floor():
+    vertices, laplacian, z = _sunk()
+    floor = np.where(vertices[:, 0] < 0, -np.inf, 0.01 * vertices[:, 0])
+    high = np.linalg.norm(vertices[:, :2], axis=1) < 40
+    found = restore(vertices, laplacian, z - 0.9, high, np.array([0]), _one_part(len(z)), floor=floor)
+    assert (found.z >= np.where(high, floor, -np.inf)).all()
+    assert found.set_on_floor == (found.z == floor).sum() > 10
+    free = vertices[:, 0] < 0
+    assert (found.z[free] < -0.01 * vertices[free, 0]).any()  # the mirrored floor
+
+
 def test_plane_holds_the_surface_off_and_never_pulls_it():
     vertices, laplacian, z = _sunk()
-    everywhere = np.ones(len(z), dtype=bool)
     high = np.linalg.norm(vertices[:, :2], axis=1) < 40
     found = restore(
-        vertices, laplacian, z - 0.9, high, np.array([0]), _one_part(len(z)), in_front=everywhere, blend=1.0
+        vertices,
+        laplacian,
+        z - 0.9,
+        high,
+        np.array([0]),
+        _one_part(len(z)),
+        floor=np.zeros(len(z)),
+        blend=1.0,
     )
     force = (laplacian @ (found.z - vertices[:, 2]))[high]
     on_plane = found.z[high] == 0
