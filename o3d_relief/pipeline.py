@@ -236,7 +236,7 @@ def make_relief(
     trimmed = trim_step(in_vertices, out_faces, frame, scene, vertices, z)
     if len(trimmed.faces) == 0:
         raise MeshError("Nothing of the scene is left in front of the relief plane.")
-    relief_mesh = trimmed_mesh(mesh, trimmed)
+    relief_mesh, attributes_mended = trimmed_mesh(mesh, trimmed)
     journal.keep(
         TrimStage(
             counts={
@@ -246,6 +246,7 @@ def make_relief(
                 "faces_dropped": trimmed.faces_dropped,
                 "cut_vertices": int((trimmed.source_index < 0).sum()),
                 "faces_turned": turned,
+                "attributes_mended": attributes_mended,
             }
         )
     )

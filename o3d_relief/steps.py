@@ -26,7 +26,7 @@ from o3d_relief.records import (
     SceneStage,
     VisibilityStage,
 )
-from o3d_relief.scene.frame import Frame, relief_frame, to_relief_units
+from o3d_relief.scene.frame import RELIEF_UNITS, Frame, relief_frame, to_relief_units
 from o3d_relief.scene.weld import weld
 from o3d_relief.stages.attenuation import (
     actions,
@@ -51,6 +51,9 @@ from o3d_relief.stages.perspective import forced_perspective
 from o3d_relief.stages.restoration import restore
 from o3d_relief.stages.trim import Trimmed, trim_behind
 from o3d_relief.stages.visibility import turned_away, visible_vertices
+
+_OUT_OF_SHAPE = 1e3
+"""A forced perspective that makes the scene larger or smaller by more than this leaves nothing of it."""
 
 _ON_PLANE = 1e-9
 """Heights within this of S, in relief units, lie on it: rounding errors leave no slivers at the cut."""
@@ -102,7 +105,14 @@ def perspective_step(vertices: NDArray[np.float64], view: View) -> PerspectiveSt
     if view.vanishing_point is None:
         return PerspectiveStage(vertices=vertices)
     plane = None if view.viewpoint is None else view.viewpoint[2]
-    return PerspectiveStage(vertices=forced_perspective(vertices, view.vanishing_point, view_plane=plane))
+    drawn = forced_perspective(vertices, view.vanishing_point, view_plane=plane)
+    extent = float(np.ptp(drawn[:, :2], axis=0).max())
+    if not RELIEF_UNITS / _OUT_OF_SHAPE <= extent <= RELIEF_UNITS * _OUT_OF_SHAPE:
+        raise ParameterError(
+            f"vanishing_point must leave the scene its shape: it would be {extent:.2g} relief units large. "
+            f"Got {view.vanishing_point} instead: choose one further behind, or a viewpoint closer by."
+        )
+    return PerspectiveStage(vertices=drawn)
 
 
 def visibility_step(vertices: NDArray[np.float64], faces: NDArray[np.int64], view: View) -> VisibilityStage:

@@ -10,6 +10,9 @@ from o3d_relief.errors import MeshError
 
 __all__ = ["mesh_arrays"]
 
+_LARGEST = 1e50
+"""Squared areas of larger scenes, and of scenes smaller than the inverse, leave the range of float64."""
+
 
 def mesh_arrays(mesh: o3d.geometry.TriangleMesh) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Copy vertices and faces out of an Open3D mesh and check them.
@@ -27,8 +30,8 @@ def mesh_arrays(mesh: o3d.geometry.TriangleMesh) -> tuple[NDArray[np.float64], N
     Raises
     ------
     MeshError
-        Not a TriangleMesh, no vertices, no triangles, vertices of faces that are not finite, or indices
-        out of range.
+        Not a TriangleMesh, no vertices, no triangles, indices out of range, or vertices of faces that are
+        not finite or too large or small to compute with.
     """
     if not isinstance(mesh, o3d.geometry.TriangleMesh):
         kind = f"{type(mesh).__module__}.{type(mesh).__qualname__}"
@@ -46,10 +49,29 @@ def mesh_arrays(mesh: o3d.geometry.TriangleMesh) -> tuple[NDArray[np.float64], N
             f"A triangle names vertex {wrong}, but the mesh has the vertices 0 to {len(vertices) - 1}: "
             "the mesh is damaged."
         )
-    bad = int((~np.isfinite(vertices[faces]).all(axis=(1, 2))).sum())
-    if bad:
+    used = np.zeros(len(vertices), dtype=bool)
+    used[faces] = True
+    finite = np.isfinite(vertices).all(axis=1)
+    if not finite[used].all():
+        bad = int((~finite[faces]).any(axis=1).sum())
         raise MeshError(
             f"The mesh has vertices that are not finite numbers, in {bad} of its {len(faces)} triangles: "
             "remove these first."
         )
+    _check_size(vertices[used])
     return vertices, faces
+
+
+def _check_size(used: NDArray[np.float64]) -> None:
+    largest = float(np.abs(used).max())
+    if largest > _LARGEST:
+        raise MeshError(
+            f"The mesh has coordinates up to {largest:.0e}, and {_LARGEST:.0e} is the most that can be "
+            "computed with: scale it down first."
+        )
+    extent = float(np.ptp(used, axis=0).max())
+    if 0.0 < extent < 1.0 / _LARGEST:
+        raise MeshError(
+            f"The mesh is only {extent:.0e} large, and {1.0 / _LARGEST:.0e} is the least that can be "
+            "computed with: scale it up first."
+        )
