@@ -87,7 +87,9 @@ def _make(options: argparse.Namespace) -> None:
     mesh = read_mesh(options.input)
     _tell(f"{options.input}: {len(mesh.vertices)} vertices, {len(mesh.triangles)} triangles")
     try:
-        relief = make_relief(mesh, params, view=view, on_stage=_tell_stage)
+        relief = make_relief(
+            mesh, params, view=view, on_stage=_tell_stage, max_triangles=options.max_triangles
+        )
     except MeshError as error:
         raise MeshError(f"{options.input}: {error}") from error
     if options.strict and relief.certificate.failures:

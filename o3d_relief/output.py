@@ -9,7 +9,7 @@ import open3d as o3d
 from numpy.typing import NDArray
 
 from o3d_relief.scene.arrays import mended
-from o3d_relief.scene.weld import first_of_equal_rows
+from o3d_relief.scene.weld import same_places
 from o3d_relief.stages.trim import Trimmed
 
 __all__ = ["smooth_normals", "trimmed_mesh"]
@@ -19,7 +19,7 @@ _CREASE = 0.866
 
 
 def trimmed_mesh(
-    mesh: o3d.geometry.TriangleMesh, trimmed: Trimmed
+    mesh: o3d.geometry.TriangleMesh, trimmed: Trimmed, unit: float
 ) -> tuple[o3d.geometry.TriangleMesh, int]:
     """Build the output mesh and carry the input's attributes over to it.
 
@@ -32,6 +32,8 @@ def trimmed_mesh(
     mesh : open3d.geometry.TriangleMesh
         The input, whose vertex and triangle numbers `trimmed` refers to.
     trimmed : Trimmed
+    unit : float
+        Length of one relief unit, in the unit of the mesh.
 
     Returns
     -------
@@ -61,7 +63,7 @@ def trimmed_mesh(
         o3d.geometry.Image() if image.is_empty() else o3d.geometry.Image(np.array(image))
         for image in mesh.textures
     ]
-    normals = smooth_normals(trimmed.vertices, trimmed.faces)
+    normals = smooth_normals(trimmed.vertices / unit, trimmed.faces)
     result.vertex_normals = o3d.utility.Vector3dVector(normals)
     return result, bad_colors + bad_uvs
 
@@ -75,6 +77,7 @@ def smooth_normals(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> N
     Parameters
     ----------
     vertices : (n, 3) float64
+        In relief units.
     faces : (m, 3) int64
 
     Returns
@@ -91,7 +94,7 @@ def smooth_normals(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> N
         ],
         axis=1,
     )
-    first = first_of_equal_rows(vertices)
+    first = same_places(vertices, faces)
     shared = np.stack(
         [np.bincount(first, weights=along, minlength=len(vertices)) for along in own.T], axis=1
     )[first]

@@ -28,6 +28,7 @@ from o3d_relief.records import (
 )
 from o3d_relief.scene.frame import RELIEF_UNITS, Frame, relief_frame, to_relief_units
 from o3d_relief.scene.weld import weld
+from o3d_relief.scene.winding import wrongly_wound
 from o3d_relief.stages.attenuation import (
     actions,
     attenuate,
@@ -86,6 +87,7 @@ def scene_step(
         vertices=welded.vertices,
         faces=welded.faces,
         welded_index=welded.index,
+        welded_face=welded.face_index,
         unit=frame.unit,
         counts={
             "input_vertices": len(in_vertices),
@@ -359,9 +361,14 @@ def turned_to_viewer(
     visible: NDArray[np.bool_],
     laplacian: sp.csr_array,
 ) -> tuple[NDArray[np.int64], int]:
-    """Turn the faces of components that show their inside; return the faces and how many were turned."""
+    """Turn faces that disagree with their surface, and components that show their inside.
+
+    Return the faces and how many were turned. Of duplicate faces all are turned or none: where a surface has
+    both its sides, it keeps them.
+    """
     _, label = connected_components(laplacian, directed=False)
-    away = turned_away(vertices, scene.faces, visible, label)
-    welded = scene.welded_index[in_faces[:, 0]]
-    turn = (welded >= 0) & away[label[welded]]
+    wrong = wrongly_wound(vertices, scene.faces)
+    wound = np.where(wrong[:, None], scene.faces[:, [0, 2, 1]], scene.faces)
+    away = turned_away(vertices, wound, visible, label)
+    turn = np.append(wrong ^ away[label[scene.faces[:, 0]]], False)[scene.welded_face]  # -1 takes the last
     return np.where(turn[:, None], in_faces[:, [0, 2, 1]], in_faces), int(turn.sum())

@@ -22,13 +22,14 @@ _usually = {
 _sometimes = {
     "beta": _one_of([0.0, 1e-9, 3.0, 1e9]),
     "blend": _one_of([0.0, 1.0]),
-    "discard_above": _one_of([0.0, 0.3, 1.0]),
+    "discard_above": _one_of([0.3, 0.31, 1.0]),
     "attach_below": _one_of([0.0, 0.25]),
     "max_order_error": _one_of([0.0, 1.0]),
-    "min_gap": _one_of([1e-9, 3.0, 1e12]),
     "alpha": _one_of([1e-6, 0.5, 1.0]),
 }
-_depth = st.fixed_dictionaries({"depth": _one_of([1e-9, 1.0, 1e9])})
+_depth = st.fixed_dictionaries(
+    {"depth": _one_of([1e-9, 1.0, 1e9]), "min_gap": _one_of([0.0, 1e-9, 3.0, 1e12]), "in_order": st.just(True)}
+)
 params = st.one_of(
     st.fixed_dictionaries(_usually),
     st.fixed_dictionaries(_usually, optional=_sometimes),

@@ -147,7 +147,8 @@ SAMPLES: dict[str, Callable[[], Files]] = {
 """Files by name, the main one last."""
 
 _EDITS = (
-    "flip", "zero", "cut", "drop", "repeat", "insert", "token", "word", "lines", "json", "json", "count", "other"
+    "flip", "flip", "zero", "cut", "drop", "repeat", "insert", "token", "token", "word", "word", "word", "lines", "json",
+    "json", "json", "count", "count", "other",
 )  # fmt: skip
 
 _edit = st.tuples(

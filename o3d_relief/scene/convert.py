@@ -7,6 +7,7 @@ import open3d as o3d
 from numpy.typing import NDArray
 
 from o3d_relief.errors import MeshError
+from o3d_relief.limits import check_triangles
 
 __all__ = ["mesh_arrays"]
 
@@ -14,13 +15,17 @@ _LARGEST = 1e50
 """Squared areas of larger scenes, and of scenes smaller than the inverse, leave the range of float64."""
 
 
-def mesh_arrays(mesh: o3d.geometry.TriangleMesh) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def mesh_arrays(
+    mesh: o3d.geometry.TriangleMesh, max_triangles: int | None = None
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Copy vertices and faces out of an Open3D mesh and check them.
 
     Parameters
     ----------
     mesh : open3d.geometry.TriangleMesh
         Never modified.
+    max_triangles : int, optional
+        Larger meshes are refused; 10,000,000 where omitted.
 
     Returns
     -------
@@ -29,13 +34,16 @@ def mesh_arrays(mesh: o3d.geometry.TriangleMesh) -> tuple[NDArray[np.float64], N
 
     Raises
     ------
+    ParameterError
+        `max_triangles` is not a positive whole number.
     MeshError
-        Not a TriangleMesh, no vertices, no triangles, indices out of range, or vertices of faces that are
+        Not a TriangleMesh, too large for `max_triangles` or for the memory, no vertices, no triangles, indices out of range, or vertices of faces that are
         not finite or too large or small to compute with.
     """
     if not isinstance(mesh, o3d.geometry.TriangleMesh):
         kind = f"{type(mesh).__module__}.{type(mesh).__qualname__}"
         raise MeshError(f"The scene must be an open3d.geometry.TriangleMesh. Got a {kind} instead.")
+    check_triangles(len(mesh.triangles), max_triangles)
     vertices = np.array(mesh.vertices, dtype=np.float64).reshape(-1, 3)
     faces = np.array(mesh.triangles, dtype=np.int64).reshape(-1, 3)
     if len(vertices) == 0:

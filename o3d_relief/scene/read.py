@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o3d_relief.errors import FileError, MeshError
+from o3d_relief.limits import check_file_size
 from o3d_relief.scene.arrays import MeshArrays, to_open3d
 from o3d_relief.scene.gltf import decode_gltf
 from o3d_relief.scene.obj import decode_obj
@@ -51,7 +52,8 @@ def read_mesh(path: str | Path) -> o3d.geometry.TriangleMesh:
     Raises
     ------
     FileError
-        The file is missing, unreadable, damaged, too short, or of a format that is not read.
+        The file is missing, unreadable, damaged, too short, of a format that is not read, or so large that
+        reading it would need more memory than there is.
     MeshError
         The file has no triangles, for instance because it is a point cloud.
 
@@ -80,6 +82,7 @@ def _read_bytes(path: Path) -> bytes:
             raise FileError(f"{path} does not exist: check its name and folder.")
         if path.suffix.lower() not in READABLE:
             raise FileError(f"{path} cannot be read: its ending must be one of {', '.join(READABLE)}.")
+        check_file_size(path, path.stat().st_size)
         data = path.read_bytes()
     except FileError:
         raise
