@@ -59,12 +59,17 @@ def main() -> int:
             suppress_health_check=list(HealthCheck),
         )(campaign)
         seed(options.seed * 1_000_003 + first)(campaign)()
+        if first % (10 * _RUN) == 0 and first:
+            print(f"{first} cases, {time.perf_counter() - started:.0f} s", file=sys.stderr, flush=True)
     pool.close()
     print(f"\n{'cases of':<18}{'relief':>8}{'refused':>9}{'failed':>8}")
     for kind in sorted({kind for kind, _ in counts}):
         row = [counts[kind, outcome] for outcome in ("relief", "refused", "BUG")]
         print(f"{kind:<18}{row[0]:>8}{row[1]:>9}{row[2]:>8}")
-    row = [sum(n for (_, found), n in counts.items() if found == wanted) for wanted in ("relief", "refused", "BUG")]
+    row = [
+        sum(n for (_, found), n in counts.items() if found == wanted)
+        for wanted in ("relief", "refused", "BUG")
+    ]
     print(f"{'all':<18}{row[0]:>8}{row[1]:>9}{row[2]:>8}")
     print(f"{sum(row)} cases, seed {options.seed}, {time.perf_counter() - started:.0f} s")
     return bool(failures)

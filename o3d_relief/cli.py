@@ -79,13 +79,15 @@ def _make(options: argparse.Namespace) -> None:
     _check_places(options)
 
     from o3d_relief.pipeline import make_relief
-    from o3d_relief.scene.read import read_mesh
-    from o3d_relief.scene.write import check_writable, write_mesh
+    from o3d_relief.scene.read import read_mesh_and_notes
+    from o3d_relief.scene.write import check_writable, lost_attributes, write_mesh
 
     check_writable(options.output)
     started = time.perf_counter()
-    mesh = read_mesh(options.input)
+    mesh, notes = read_mesh_and_notes(options.input)
     _tell(f"{options.input}: {len(mesh.vertices)} vertices, {len(mesh.triangles)} triangles")
+    for note in [*notes, *lost_attributes(options.output, mesh)]:
+        _tell(note)
     try:
         relief = make_relief(
             mesh, params, view=view, on_stage=_tell_stage, max_triangles=options.max_triangles

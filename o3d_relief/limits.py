@@ -70,8 +70,8 @@ def check_file_size(path: Path, size: int) -> None:
     needed, free = size * _READING.get(path.suffix.lower(), 1), available_memory()
     if needed > free:
         raise FileError(
-            f"{path} is not read: it would need about {_words(needed)} of memory and {_words(free)} are free. "
-            "Reduce the mesh in another program, or use a machine with more memory."
+            f"{path} is not read: it would need about {_words(needed)} of memory and {_words(free)} are "
+            "free. Reduce the mesh in another program, or use a machine with more memory."
         )
 
 

@@ -19,12 +19,11 @@ from shapes import bust, exploded, hills, joined, moved, sphere
 Files = dict[str, bytes]
 Edit = tuple[str, float, int]
 
-TOKENS = (
-    b"nan", b"inf", b"-inf", b"1e400", b"-1e300", b"1e-320", b"-0", b"-1", b"0", b"1", b"3", b"255", b"65536",
-    b"2147483647", b"2147483648", b"4294967295", b"99999999999999999999", b"", b"abc", b"\xff\xfe", b"1e9", b"0x10",
-    b"#", b"\\", b"/", b"//", b"1//1", b"-1/-1/-1", b"list", b"uchar", b"double", b"element", b"face", b"vertex",
-    b"property", b"end_header", b"comment", b"usemtl", b"mtllib", b"v", b"f", b"vt", b"facet", b"endsolid", b"COFF",
-)  # fmt: skip
+TOKENS = tuple(
+    b"nan inf -inf 1e400 -1e300 1e-320 -0 -1 0 1 3 255 65536 2147483647 2147483648 4294967295 1e9 0x10 "
+    b"99999999999999999999 abc \xff\xfe # \\ / // 1//1 -1/-1/-1 list uchar double element face vertex "
+    b"property end_header comment usemtl mtllib v f vt facet endsolid COFF ".split(b" ")
+)
 WORDS = tuple(
     struct.pack(order + kind, value)
     for order in "<>"
@@ -36,10 +35,10 @@ WORDS = tuple(
     for value in values
 )
 JSON_VALUES = (
-    None, True, -1, 0, 1, 2, 3, 5, 5120, 5121, 5123, 5125, 5126, 999999, 2**31, 2**63, 1e308, -1e-300, 0.5, "", "SCALAR",
-    "VEC2", "VEC3", "VEC4", "MAT4", "data:,", "data:application/octet-stream;base64,AAAA", "missing.bin", [], [0], [1, 2, 3],
-    [0.0] * 16, [1e300] * 16, {}, {"TEXCOORD_0": 0}, float("nan"),
-)  # fmt: skip
+    *(None, True, -1, 0, 1, 2, 3, 5, 5120, 5121, 5123, 5125, 5126, 999999, 2**31, 2**63, 1e308, -1e-300, 0.5),
+    *("", "SCALAR", "VEC2", "VEC3", "VEC4", "MAT4", "data:,", "data:application/octet-stream;base64,AAAA"),
+    *("missing.bin", [], [0], [1, 2, 3], [0.0] * 16, [1e300] * 16, {}, {"TEXCOORD_0": 0}, float("nan")),
+)
 
 
 def _shape() -> tuple[np.ndarray, np.ndarray]:
@@ -107,7 +106,9 @@ def _off(kind: str) -> bytes:
 
 def _scene() -> trimesh.Scene:
     first = trimesh.Trimesh(*_shape(), process=False)
-    material = PBRMaterial(baseColorTexture=Image.new("RGB", (2, 2), "red"), baseColorFactor=[9, 99, 255, 255])
+    material = PBRMaterial(
+        baseColorTexture=Image.new("RGB", (2, 2), "red"), baseColorFactor=[9, 99, 255, 255]
+    )
     first.visual = TextureVisuals(uv=np.full((len(first.vertices), 2), 0.25), material=material)
     second = trimesh.Trimesh(*sphere(4), process=False)
     second.visual.vertex_colors = np.full((len(second.vertices), 4), 77, np.uint8)
@@ -146,13 +147,44 @@ SAMPLES: dict[str, Callable[[], Files]] = {
 }
 """Files by name, the main one last."""
 
-_EDITS = (
-    "flip", "flip", "zero", "cut", "drop", "repeat", "insert", "token", "token", "word", "word", "word", "lines", "json",
-    "json", "json", "count", "count", "other",
-)  # fmt: skip
+_LENGTH = 40
+
+
+def _swap_lines(data: bytes, at: int, amount: int) -> bytes:
+    lines = data.split(b"\n")
+    first, second = at % len(lines), amount % len(lines)
+    lines[first], lines[second] = lines[second], lines[first]
+    return b"\n".join(lines)
+
+
+def _swap_token(data: bytes, at: int, amount: int) -> bytes:
+    words = data.split(b" ")
+    words[at % len(words)] = TOKENS[amount % len(TOKENS)]
+    return b" ".join(words)
+
+
+def _put(data: bytes, at: int, piece: bytes, instead_of: int = 0) -> bytes:
+    return data[:at] + piece + data[at + instead_of :]
+
+
+BYTE_EDITS: dict[str, Callable[[bytes, int, int], bytes]] = {
+    "flip": lambda d, at, n: _put(d, at, bytes([(d[at] if at < len(d) else 0) ^ (1 << n % 8)]), 1),
+    "word": lambda d, at, n: _put(d, at, WORDS[n % len(WORDS)], len(WORDS[n % len(WORDS)])),
+    "token": _swap_token,
+    "header": lambda d, at, n: _swap_token(d[:400], at, n) + d[400:],
+    "lines": _swap_lines,
+    "zero": lambda d, at, n: _put(d, at, bytes(n % _LENGTH), n % _LENGTH),
+    "cut": lambda d, at, n: d[:at],
+    "drop": lambda d, at, n: _put(d, at, b"", 1 + n % _LENGTH),
+    "repeat": lambda d, at, n: _put(d, at, d[at : at + 10 * (n % _LENGTH)]),
+    "insert": lambda d, at, n: _put(d, at, TOKENS[n % len(TOKENS)]),
+}
+"""What is done to the bytes of a file, at a place, with a number that says how."""
 
 _edit = st.tuples(
-    st.sampled_from(_EDITS), st.integers(0, 1022).map(lambda step: step / 1023), st.integers(0, 1023)
+    st.sampled_from([*BYTE_EDITS, "flip", "word", "word", "token", "header", "json", "json", "other"]),
+    st.integers(0, 1022).map(lambda step: step / 1023),
+    st.integers(0, 1023),
 )
 edits = st.one_of(st.tuples(_edit), st.tuples(_edit), st.tuples(_edit, _edit), st.tuples(_edit, _edit, _edit))
 
@@ -160,47 +192,16 @@ edits = st.one_of(st.tuples(_edit), st.tuples(_edit), st.tuples(_edit, _edit), s
 def edited(files: Files, edit: Edit) -> Files:
     """Return the files with one edit."""
     kind, where, amount = edit
-    files = dict(files)
     name = list(files)[-1]
-    if kind == "other":
+    if kind == "other":  # a file that the main one names
         name = list(files)[amount % len(files)]
-        kind = ("flip", "cut", "token", "drop")[amount % 4]
-    if name.endswith((".glb", ".gltf")) and kind in ("json", "token", "count"):
-        files[name] = _edit_json(files[name], where, amount, binary=name.endswith(".glb"))
+        kind = list(BYTE_EDITS)[amount % len(BYTE_EDITS)]
+    if name.endswith((".glb", ".gltf")) and kind in ("json", "token", "header"):
+        content = _edit_json(files[name], where, amount, binary=name.endswith(".glb"))
     else:
-        files[name] = _edit_bytes(files[name], kind, where, amount)
-    return files
-
-
-def _edit_bytes(data: bytes, kind: str, where: float, amount: int) -> bytes:
-    at = int(where * len(data))
-    length = 1 + amount % 40
-    match kind:
-        case "flip":
-            return data[:at] + bytes([data[at] ^ (1 << amount % 8)]) + data[at + 1 :] if at < len(data) else data
-        case "zero":
-            return data[:at] + bytes(len(data[at : at + length])) + data[at + length :]
-        case "cut":
-            return data[:at]
-        case "drop":
-            return data[:at] + data[at + length :]
-        case "repeat":
-            return data[:at] + 2 * data[at : at + 10 * length] + data[at + 10 * length :]
-        case "insert":
-            return data[:at] + TOKENS[amount % len(TOKENS)] + data[at:]
-        case "word" | "json":
-            word = WORDS[amount % len(WORDS)]
-            return data[:at] + word + data[at + len(word) :]
-        case "lines":
-            lines = data.split(b"\n")
-            first, second = int(where * len(lines)) % len(lines), amount % len(lines)
-            lines[first], lines[second] = lines[second], lines[first]
-            return b"\n".join(lines)
-        case _:  # token, count: a word of the text, of its first lines for counts
-            end = 400 if kind == "count" else len(data)
-            words = data[:end].split(b" ")
-            words[int(where * len(words)) % len(words)] = TOKENS[amount % len(TOKENS)]
-            return b" ".join(words) + data[end:]
+        kind = "word" if kind == "json" else kind
+        content = BYTE_EDITS[kind](files[name], int(where * len(files[name])), amount)
+    return files | {name: content}
 
 
 def _edit_json(data: bytes, where: float, amount: int, *, binary: bool) -> bytes:
@@ -209,7 +210,7 @@ def _edit_json(data: bytes, where: float, amount: int, *, binary: bool) -> bytes
         size = struct.unpack_from("<I", data, 12)[0] if binary else len(data)
         tree = json.loads(data[20 : 20 + size] if binary else data)
     except (struct.error, ValueError):  # damaged by an edit before
-        return _edit_bytes(data, "flip", where, amount)
+        return BYTE_EDITS["flip"](data, int(where * len(data)), amount)
     places: list[tuple[dict | list, str | int]] = []
     queue = [tree]
     while queue:

@@ -9,6 +9,7 @@ import sys
 import tempfile
 import traceback
 import warnings
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from multiprocessing.connection import Connection
@@ -76,8 +77,8 @@ class Pool:
 def _serve(pipe: Connection) -> None:
     """Run cases until the other end is closed."""
     os.environ.setdefault("OPEN3D_DISABLE_WEB_VISUALIZER", "true")
-    import o3d_relief.bounds.certificate as certificate
     from o3d_relief import steps
+    from o3d_relief.bounds import certificate
 
     if sys.platform == "linux":
         import resource
@@ -136,6 +137,8 @@ def _check(case: Case, folder: Path) -> str:
         mesh = rel.read_mesh(folder / list(case.files)[-1])
     else:
         mesh = _to_mesh(case.arrays)
+    if case.picture:
+        _try_without_relief(mesh, folder / f"in{case.output}")
     relief = rel.make_relief(mesh, rel.ReliefParams(**case.params), view=rel.View(**case.view))
     made = relief.mesh
     vertices, faces = np.asarray(made.vertices), np.asarray(made.triangles)
@@ -156,6 +159,16 @@ def _check(case: Case, folder: Path) -> str:
     if any(path.name.startswith(".") for path in folder.iterdir()):
         return "BUG: a temporary file is left"
     return "relief"
+
+
+def _try_without_relief(mesh: Any, path: Path) -> None:
+    """Draw and write the mesh as it came: either works, or is refused."""
+    import o3d_relief as rel
+
+    with suppress(rel.ReliefError):
+        rel.render(mesh, size=(32, 32))
+    with suppress(rel.ReliefError):
+        rel.write_mesh(path, mesh)
 
 
 def _to_mesh(arrays: dict[str, Any]) -> Any:

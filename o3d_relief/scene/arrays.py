@@ -41,6 +41,8 @@ class MeshArrays:
         Index into `textures` for each face. None without textures.
     textures : tuple of (h, w, 3) uint8
         Row 0 is the bottom (v = 0), as Open3D's own OBJ reader keeps them.
+    missing : tuple of str
+        Files of materials and textures that the file names and that could not be read.
     """
 
     vertices: NDArray[np.float64]
@@ -50,6 +52,7 @@ class MeshArrays:
     triangle_uvs: NDArray[np.float64] | None = None
     material_ids: NDArray[np.int64] | None = None
     textures: tuple[NDArray[np.uint8], ...] = ()
+    missing: tuple[str, ...] = ()
 
 
 def to_open3d(arrays: MeshArrays) -> o3d.geometry.TriangleMesh:
@@ -109,7 +112,7 @@ def mended(values: NDArray[np.float64], stand_in: float) -> tuple[NDArray[np.flo
     (array([[1. , 1. ],
            [0.3, 0.4]]), 1)
     """
-    usable = (np.abs(values) <= _LARGEST).all(axis=1)
+    usable = np.asarray((np.abs(values) <= _LARGEST).all(axis=1))
     return np.where(usable[:, None], values, stand_in), int((~usable).sum())
 
 

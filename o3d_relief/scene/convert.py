@@ -37,8 +37,8 @@ def mesh_arrays(
     ParameterError
         `max_triangles` is not a positive whole number.
     MeshError
-        Not a TriangleMesh, too large for `max_triangles` or for the memory, no vertices, no triangles, indices out of range, or vertices of faces that are
-        not finite or too large or small to compute with.
+        Not a TriangleMesh, too large for `max_triangles` or for the memory, no vertices, no triangles,
+        indices out of range, or vertices of faces that are not finite or too large or small to compute with.
     """
     if not isinstance(mesh, o3d.geometry.TriangleMesh):
         kind = f"{type(mesh).__module__}.{type(mesh).__qualname__}"
@@ -59,7 +59,7 @@ def mesh_arrays(
         )
     used = np.zeros(len(vertices), dtype=bool)
     used[faces] = True
-    finite = np.isfinite(vertices).all(axis=1)
+    finite = np.asarray(np.isfinite(vertices).all(axis=1))
     if not finite[used].all():
         bad = int((~finite[faces]).any(axis=1).sum())
         raise MeshError(

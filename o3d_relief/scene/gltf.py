@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -82,7 +82,21 @@ def decode_gltf(data: bytes, kind: str, resolver: Any, to_texture: Callable[[Any
     # IndexError, ValueError, AssertionError, AttributeError, zlib.error, binascii.Error ..., by chance.
     except Exception as error:
         raise FileError("it is damaged, or a file that it names is missing") from error
-    return _join([part for part in parts if len(part.faces)], to_texture)
+    arrays = _join([part for part in parts if len(part.faces)], to_texture)
+    return replace(arrays, missing=_missing_images(header, resolver))
+
+
+def _missing_images(header: dict[str, Any], resolver: Any) -> tuple[str, ...]:
+    """Return the names of the pictures that are not there."""
+    missing = []
+    for image in header.get("images", []):
+        name = image.get("uri")
+        if isinstance(name, str) and not name.startswith("data:"):
+            try:
+                resolver.get(name)
+            except (OSError, ValueError):
+                missing.append(name)
+    return tuple(missing)
 
 
 def _read_header(data: bytes, kind: str) -> dict[str, Any]:

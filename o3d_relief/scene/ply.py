@@ -55,7 +55,8 @@ def decode_ply(data: bytes, read_texture: Callable[[str], NDArray[np.uint8] | No
     if not all(axis in vertex for axis in "xyz"):
         raise FileError("it has no vertices with x, y and z")
     faces, uvs, ids = _read_faces(tables, vertex)
-    textures = tuple(texture for name in names if (texture := read_texture(name)) is not None)
+    found = {name: read_texture(name) for name in names}
+    textures = tuple(texture for name in names if (texture := found[name]) is not None)
     textured = len(textures) == len(names) > 0 and uvs is not None and ids.max(initial=0) < len(textures)
     return MeshArrays(
         vertices=_stack(vertex, ("x", "y", "z")),
@@ -65,6 +66,7 @@ def decode_ply(data: bytes, read_texture: Callable[[str], NDArray[np.uint8] | No
         triangle_uvs=uvs,
         material_ids=ids if textured else None,
         textures=textures if textured else (),
+        missing=tuple(name for name in found if found[name] is None) if uvs is not None else (),
     )
 
 
@@ -94,9 +96,7 @@ def _read_faces(
     counts = face[f"{name}#"].astype(np.int64)
     corners = fan(counts)
     faces = _whole(face[name])[corners] if len(corners) else none
-    numbers = (
-        _whole(face["texnumber"]) if "texnumber" in face else np.zeros(len(counts), dtype=np.int64)
-    )
+    numbers = _whole(face["texnumber"]) if "texnumber" in face else np.zeros(len(counts), dtype=np.int64)
     ids = np.repeat(numbers, np.maximum(counts - 2, 0))
     if "texcoord#" in face and np.array_equal(face["texcoord#"].astype(np.int64), 2 * counts):
         return faces, face["texcoord"].astype(np.float64).reshape(-1, 2)[corners].reshape(-1, 2), ids

@@ -22,7 +22,7 @@ from o3d_relief.scene.stl import decode_stl
 if TYPE_CHECKING:
     import open3d as o3d
 
-__all__ = ["READABLE", "read_mesh"]
+__all__ = ["READABLE", "read_mesh", "read_mesh_and_notes"]
 
 READABLE = (".ply", ".obj", ".stl", ".off", ".glb", ".gltf")
 """The file endings that `read_mesh` reads."""
@@ -61,6 +61,28 @@ def read_mesh(path: str | Path) -> o3d.geometry.TriangleMesh:
     --------
     >>> mesh = read_mesh("box.ply")  # doctest: +SKIP
     """
+    return read_mesh_and_notes(path)[0]
+
+
+def read_mesh_and_notes(path: str | Path) -> tuple[o3d.geometry.TriangleMesh, list[str]]:
+    """Read a mesh like `read_mesh`, and say what of the file was left out.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Returns
+    -------
+    mesh : open3d.geometry.TriangleMesh
+    notes : list of str
+        A sentence each, none as a rule.
+
+    Raises
+    ------
+    FileError, MeshError
+        As by `read_mesh`.
+    """
     path = Path(path)
     data = _read_bytes(path)
     try:
@@ -71,7 +93,10 @@ def read_mesh(path: str | Path) -> o3d.geometry.TriangleMesh:
     if len(arrays.faces) == 0:
         what = f"only {len(arrays.vertices)} points" if len(arrays.vertices) else "nothing in it"
         raise MeshError(f"{path} has no triangles, {what}: a relief needs a mesh, so make one first.")
-    return to_open3d(arrays)
+    notes = [
+        f"{path} names {name}, which cannot be read: what it colours is left plain" for name in arrays.missing
+    ]
+    return to_open3d(arrays), notes
 
 
 def _read_bytes(path: Path) -> bytes:
