@@ -51,7 +51,7 @@ def main() -> int:
 
     # Short runs of hypothesis: it tries variations of what it tried before, and should not for long.
     for first in range(0, options.count, _RUN):
-        campaign = given(st.one_of(file_cases(), mesh_cases()))(judge)
+        campaign = given(st.one_of(file_cases(), file_cases(), mesh_cases()))(judge)
         campaign = settings(
             max_examples=min(_RUN, options.count - first),
             database=None,

@@ -115,6 +115,7 @@ defects = st.tuples(
 )
 
 
+@np.errstate(all="ignore")
 def damaged(name: str, chosen: list[tuple[str, int]], damage: str | None, seed: int) -> dict[str, Any]:
     """Return the arrays of a mesh: vertices, faces, and what attributes the defects have added."""
     vertices, faces = SHAPES[name]
@@ -122,8 +123,7 @@ def damaged(name: str, chosen: list[tuple[str, int]], damage: str | None, seed: 
     for defect, amount in chosen:
         rng = np.random.default_rng(amount)
         if defect in MOVES:
-            with np.errstate(over="ignore", invalid="ignore"):
-                vertices = MOVES[defect](vertices, _SIZES[amount % len(_SIZES)], rng)
+            vertices = MOVES[defect](vertices, _SIZES[amount % len(_SIZES)], rng)
         elif defect in REBUILDS:
             vertices, faces = REBUILDS[defect](vertices, faces, rng)
         elif defect == "value":

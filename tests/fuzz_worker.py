@@ -9,7 +9,8 @@ import sys
 import tempfile
 import traceback
 import warnings
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from multiprocessing.connection import Connection
@@ -74,23 +75,38 @@ class Pool:
         self._process = None
 
 
+@contextmanager
+def _no_limits(limits: int) -> Iterator[None]:
+    yield
+
+
 def _serve(pipe: Connection) -> None:
     """Run cases until the other end is closed."""
-    os.environ.setdefault("OPEN3D_DISABLE_WEB_VISUALIZER", "true")
+    os.environ |= {
+        "OPEN3D_DISABLE_WEB_VISUALIZER": "true",
+        "OMP_NUM_THREADS": "1",
+        "OPENBLAS_NUM_THREADS": "1",
+    }
     from o3d_relief import steps
     from o3d_relief.bounds import certificate
+    from o3d_relief.linalg import solve
+    from o3d_relief.stages import attenuation, clustering
 
     if sys.platform == "linux":
         import resource
 
         resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    # A million rays for a mesh of fifty vertices would be nearly all of the time.
+    # A million rays for a mesh of fifty vertices, and to look for the libraries that use threads before each
+    # small system, would be nearly all of the time.
     for module in (steps, certificate):
         module.grid_pairs = partial(module.grid_pairs, side=_GRID)
+    for module in (solve, clustering, attenuation):
+        module.threadpool_limits = _no_limits
     warnings.simplefilter("error")
     with tempfile.TemporaryDirectory(prefix="o3d-relief-fuzz-") as folder:
-        heard = Path(folder) / "heard"
+        heard, work = Path(folder) / "heard", Path(folder) / "case"
+        work.mkdir()
         stream = os.open(heard, os.O_RDWR | os.O_CREAT | os.O_APPEND)
         for number in (1, 2):
             os.dup2(stream, number)
@@ -100,12 +116,9 @@ def _serve(pipe: Connection) -> None:
             except EOFError:
                 return
             os.truncate(heard, 0)
-            work = Path(folder) / "case"
-            work.mkdir()
             outcome = _run(case, work)
-            for path in sorted(work.rglob("*"), reverse=True):
-                path.rmdir() if path.is_dir() else path.unlink()
-            work.rmdir()
+            for path in work.iterdir():
+                path.unlink()
             said = heard.read_bytes()
             if said and not outcome.startswith("BUG"):
                 outcome = f"BUG: something was printed: {said[:300]!r}"

@@ -117,7 +117,7 @@ def read_surface(mesh: o3d.geometry.TriangleMesh, crease_degrees: float) -> Surf
         vertices=vertices,
         faces=faces[keep],
         normals=normals,
-        corner_normals=crease_normals(vertices, faces[keep], normals, crease_degrees),
+        corner_normals=crease_normals(vertices / extent, faces[keep], normals, crease_degrees),
         doubled=_doubled(number_places(vertices)[faces[keep]]),
         vertex_colors=colors,
         corner_uvs=uvs,
