@@ -11,7 +11,7 @@ import trimesh
 
 from o3d_relief.errors import FileError, MeshError
 from o3d_relief.scene.read import read_mesh
-from o3d_relief.scene.write import WRITABLE, check_writable, write_mesh
+from o3d_relief.scene.write import WRITABLE, check_writable, lost_attributes, write_mesh
 
 OFFSET = np.array([1e6, -2e5, 3.0])
 
@@ -206,6 +206,40 @@ class TestRoundTrip:
             (tmp_path / folder).mkdir()
             write_mesh(tmp_path / folder / f"a{ending}", MESHES[kind]())
         assert contents(tmp_path / "one") == contents(tmp_path / "two")
+
+
+class TestLosses:
+    @pytest.mark.parametrize(
+        ("name", "kind", "lost"),
+        [
+            ("a.ply", "colored", []),
+            ("a.ply", "textured", ["textures"]),
+            ("a.STL", "colored", ["colours"]),
+            ("a.stl", "textured", ["colours", "textures"]),
+            ("a.stl", "plain", []),
+            ("a.obj", "textured", []),
+            ("a.glb", "textured", []),
+        ],
+    )
+    def test_said_in_one_sentence(self, name, kind, lost):
+        what, form = " and no ".join(lost), name[2:].upper()
+        wanted = f"{name} will have no {what}: {form} cannot hold them; OBJ and GLB can"
+        assert lost_attributes(name, MESHES[kind]()) == ([wanted] if lost else [])
+
+    @pytest.mark.parametrize("ending", WRITABLE)
+    def test_what_is_not_finite_is_mended(self, tmp_path, ending):
+        mesh = textured_mesh()
+        np.asarray(mesh.vertex_colors)[3] = np.nan
+        np.asarray(mesh.triangle_uvs)[5] = [np.inf, 1e300]
+        np.asarray(mesh.vertex_normals)[2] = np.nan
+        write_mesh(tmp_path / f"a{ending}", mesh)
+        back = read_mesh(tmp_path / f"a{ending}")
+        for values in (back.vertex_colors, back.triangle_uvs, back.vertex_normals):
+            assert np.isfinite(np.asarray(values)).all()
+        if ending == ".obj":
+            equal(back.vertex_colors[3], [1, 1, 1])
+            equal(back.triangle_uvs[5], [0.5, 0.5])
+            assert not back.has_vertex_normals()
 
 
 class TestPlaces:
