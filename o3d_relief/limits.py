@@ -7,7 +7,7 @@ from pathlib import Path
 
 from o3d_relief.errors import FileError, MeshError, ParameterError
 
-__all__ = ["MAX_TRIANGLES", "available_memory", "check_file_size", "check_triangles"]
+__all__ = ["MAX_TRIANGLES", "available_memory", "check_file_size", "check_triangles", "memory_for"]
 
 MAX_TRIANGLES = 10_000_000
 """Largest number of triangles that is accepted where no other is given; ten times a full scan."""
@@ -100,12 +100,26 @@ def check_triangles(count: int, most: int | None = None) -> None:
             f"The mesh has {count:,} triangles, more than the {most:,} that are accepted (max_triangles): "
             "reduce it first, or accept more."
         )
-    needed, free = count * _RELIEF, available_memory()
-    if needed > free:
+    if not memory_for(count):
         raise MeshError(
-            f"The mesh has {count:,} triangles: a relief of it would need about {_words(needed)} of memory "
-            f"and {_words(free)} are free. Reduce it first, or use a machine with more memory."
+            f"The mesh has {count:,} triangles: a relief of it would need about {_words(count * _RELIEF)} of "
+            f"memory and {_words(available_memory())} are free. Reduce it first, or use a machine with more "
+            "memory."
         )
+
+
+def memory_for(triangles: int) -> bool:
+    """Tell whether there is memory for a relief of so many triangles.
+
+    Parameters
+    ----------
+    triangles : int
+
+    Returns
+    -------
+    bool
+    """
+    return triangles * _RELIEF <= available_memory()
 
 
 def _words(size: int) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o3d_relief.errors import FileError
+from o3d_relief.limits import memory_for
 from o3d_relief.scene.arrays import WHITE, MeshArrays
 
 __all__ = ["decode_gltf"]
@@ -46,8 +47,8 @@ def decode_gltf(data: bytes, kind: str, resolver: Any, to_texture: Callable[[Any
         The file.
     kind : {"glb", "gltf"}
         Binary or JSON.
-    resolver : trimesh.resolvers.Resolver
-        Finds other files that the file names.
+    resolver
+        Finds other files that the file names: by `get(name)`, `[name]`, or raises an OSError.
     to_texture : callable
         Turns a PIL picture into a texture.
 
@@ -75,7 +76,11 @@ def decode_gltf(data: bytes, kind: str, resolver: Any, to_texture: Callable[[Any
     try:
         _check_header(header)
         loaded = loaders.mesh_loaders[kind](file_obj=wrap_as_stream(data), file_type=kind, resolver=resolver)
-        parts = [_place(geometry, matrix) for geometry, matrix in _walk(loaded) if "faces" in geometry]
+        placed = [(geometry, matrix) for geometry, matrix in _walk(loaded) if "faces" in geometry]
+        triangles = sum(len(geometry["faces"]) for geometry, _ in placed)
+        if not memory_for(triangles):  # a small file may show one mesh a million times
+            raise FileError(f"its nodes show {triangles:,} triangles, more than there is memory for")
+        parts = [_place(geometry, matrix) for geometry, matrix in placed]
     except FileError:
         raise
     # trimesh reads the JSON as it comes and checks little: a damaged file ends in a KeyError,
@@ -129,7 +134,11 @@ def _check_header(header: dict[str, Any]) -> None:
     floats = [accessor.get("componentType") == _FLOAT for accessor in accessors]
     for mesh in header.get("meshes", []):
         for primitive in mesh.get("primitives", []):
-            index = primitive.get("attributes", {}).get("TEXCOORD_0")
+            attributes = primitive.get("attributes", {})
+            for index in (attributes.get("POSITION"), primitive.get("indices")):
+                if isinstance(index, int) and "bufferView" not in accessors[index]:
+                    raise FileError("it has geometry without data, save it without compression")
+            index = attributes.get("TEXCOORD_0")
             if isinstance(index, int) and not all(floats[index : index + 1]):
                 raise FileError("its texture coordinates are whole numbers, save them as floats")
 

@@ -6,6 +6,7 @@ import warnings
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from urllib.parse import unquote
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,6 +108,8 @@ def _read_bytes(path: Path) -> bytes:
             raise FileError(f"{path} does not exist: check its name and folder.")
         if path.suffix.lower() not in READABLE:
             raise FileError(f"{path} cannot be read: its ending must be one of {', '.join(READABLE)}.")
+        if not path.is_file():
+            raise FileError(f"{path} cannot be read: it is a device or a pipe. Save it as a file first.")
         check_file_size(path, path.stat().st_size)
         data = path.read_bytes()
     except FileError:
@@ -136,18 +139,38 @@ def _decode(path: Path, data: bytes) -> MeshArrays:
         return decode_stl(data)
     if kind == "off":
         return decode_off(data)
-    from trimesh.resolvers import FilePathResolver
+    return decode_gltf(data, kind, _Neighbours(path.parent), _to_texture)
 
-    return decode_gltf(data, kind, FilePathResolver(str(path.absolute())), _to_texture)
+
+class _Neighbours:
+    """Finds the files that a glTF file names, for trimesh."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def get(self, name: str) -> bytes:
+        content = _read_neighbour(self._folder, name)
+        if content is None:
+            content = _read_neighbour(self._folder, unquote(name))
+        if content is None:
+            raise FileNotFoundError(name)
+        return content
+
+    __getitem__ = get
 
 
 def _read_neighbour(folder: Path, name: str) -> bytes | None:
-    """Read a file that another one names; where its folder is unknown here, look beside the other one."""
+    """Read a file that another one names; where its folder is unknown here, look beside the other one.
+
+    None where there is none.
+    """
     name = name.strip().strip('"').replace("\\", "/")
     for place in (folder / name, folder / Path(name).name):
         try:
-            return place.read_bytes()
-        except (OSError, ValueError):
+            if place.is_file():  # a device would never end
+                check_file_size(place, place.stat().st_size)
+                return place.read_bytes()
+        except (OSError, ValueError):  # one that is too large for the memory, too
             continue
     return None
 

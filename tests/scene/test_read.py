@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import struct
 
 import numpy as np
@@ -553,6 +554,84 @@ class TestGlb:
             FileError, match=r"a\.glb cannot be read: it has a face with a vertex that does not"
         ):
             read_mesh(save(tmp_path / "a.glb", broken))
+
+
+def glb_tree(data):
+    """Return the header of a GLB file and what follows it."""
+    size = struct.unpack_from("<I", data, 12)[0]
+    return json.loads(data[20 : 20 + size]), data[20 + size :]
+
+
+def glb_of(tree, rest):
+    text = json.dumps(tree).encode()
+    text += b" " * (-len(text) % 4)
+    return struct.pack("<4sIII4s", b"glTF", 2, 20 + len(text) + len(rest), len(text), b"JSON") + text + rest
+
+
+class TestBombs:
+    """Small files that would use up the memory, or never end."""
+
+    @pytest.fixture
+    def box(self):
+        return glb_tree(trimesh.Scene(trimesh.creation.box()).export(file_type="glb"))
+
+    @pytest.mark.parametrize("children", [lambda first: [0], lambda first: [first, first]])
+    def test_nodes_in_a_circle_or_doubled_forty_times(self, tmp_path, box, children):
+        tree, rest = box
+        first = len(tree["nodes"])
+        tree["nodes"] += [{"children": children(first + i + 1)} for i in range(40)]
+        tree["nodes"] += [{"mesh": 0}]
+        tree["nodes"][0].setdefault("children", []).append(first)
+        assert len(read_mesh(save(tmp_path / "a.glb", glb_of(tree, rest))).triangles) <= 24
+
+    def test_one_mesh_shown_very_often(self, tmp_path, box, monkeypatch):
+        tree, rest = box
+        first = len(tree["nodes"])
+        tree["nodes"] += [{"mesh": 0} for _ in range(999)]
+        tree["scenes"][0]["nodes"] += range(first, first + 999)
+        path = save(tmp_path / "a.glb", glb_of(tree, rest))
+        assert len(read_mesh(path).triangles) == 12_000
+        monkeypatch.setattr("o3d_relief.scene.gltf.memory_for", lambda triangles: triangles < 12_000)
+        with pytest.raises(
+            FileError, match=r"its nodes show 12,000 triangles, more than there is memory for"
+        ):
+            read_mesh(path)
+
+    @pytest.mark.parametrize("accessor", [0, 1])
+    def test_geometry_without_data(self, tmp_path, box, accessor):
+        tree, rest = box
+        del tree["accessors"][accessor]["bufferView"]
+        tree["accessors"][accessor]["count"] = 2**31
+        with pytest.raises(FileError, match="it has geometry without data, save it without compression"):
+            read_mesh(save(tmp_path / "a.glb", glb_of(tree, rest)))
+
+    @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="devices and pipes of POSIX")
+    def test_devices_and_pipes(self, tmp_path):
+        os.mkfifo(tmp_path / "a.ply")
+        with pytest.raises(FileError, match=r"a\.ply cannot be read: it is a device or a pipe\."):
+            read_mesh(tmp_path / "a.ply")
+        path = save(tmp_path / "a.obj", QUAD_OBJ.replace("a.mtl", "/dev/zero"))
+        assert "names /dev/zero, which cannot be read" in read_mesh_and_notes(path)[1][0]
+        files = trimesh.Scene(trimesh.creation.box()).export(file_type="gltf")
+        tree = json.loads(files["model.gltf"])
+        tree["buffers"][0]["uri"] = "/dev/zero"
+        with pytest.raises(FileError, match="damaged, or a file that it names is missing"):
+            read_mesh(save(tmp_path / "a.gltf", json.dumps(tree)))
+
+    def test_a_texture_too_large_for_the_memory(self, tmp_path, monkeypatch):
+        save(tmp_path / "a.mtl", QUAD_MTL)
+        save(tmp_path / "wood.png", bytes(10_000))
+        path = save(tmp_path / "a.obj", QUAD_OBJ)
+        monkeypatch.setattr("o3d_relief.limits.available_memory", lambda: 9_000)
+        assert "wood.png, which cannot be read" in read_mesh_and_notes(path)[1][0]
+
+    def test_names_in_a_gltf_file_may_be_escaped(self, tmp_path):
+        files = trimesh.Scene(trimesh.creation.box()).export(file_type="gltf")
+        tree = json.loads(files.pop("model.gltf"))
+        for buffer in tree["buffers"]:
+            save(tmp_path / f"a {buffer['uri']}", files[buffer["uri"]])
+            buffer["uri"] = f"a%20{buffer['uri']}"
+        assert len(read_mesh(save(tmp_path / "a.gltf", json.dumps(tree))).triangles) == 12
 
 
 class TestRefusals:
