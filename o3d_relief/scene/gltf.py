@@ -173,7 +173,10 @@ def _place(geometry: dict[str, Any], matrix: NDArray[np.float64]) -> _Part:
         normals = np.asarray(normals, dtype=np.float64) @ np.linalg.pinv(linear)
         lengths = np.linalg.norm(normals, axis=1, keepdims=True)
         normals = normals / np.where(lengths > 0.0, lengths, 1.0)
-    colors, uvs, image = _read_material(geometry, len(vertices))
+    n = len(vertices)
+    colors, uvs, image = _read_material(geometry, n)
+    if (colors is not None and colors.shape != (n, 3)) or (uvs is not None and uvs.shape != (n, 2)):
+        raise FileError("it is damaged")
     return _Part(
         vertices=vertices @ linear.T + matrix[:3, 3],
         faces=faces,

@@ -157,6 +157,10 @@ class TestPly:
         mesh = read_mesh(save(tmp_path / "a.ply", data[:start] + floats.tobytes() + data[start + 120 :]))
         assert np.isnan(vertices_of(mesh)[4, 0])
 
+    def test_a_texture_without_a_name_is_a_comment(self, tmp_path):
+        text = ascii_ply().replace("comment made here", "comment TextureFile")
+        assert len(read_mesh(save(tmp_path / "a.ply", text)).triangles) == 3
+
     def test_missing_texture_is_noted(self, tmp_path):
         header = PLY_HEADER.format("ascii").replace("made here", "TextureFile gone.png")
         header = header.replace("comment made", "comment") + "property float s\nproperty float t\n"
@@ -545,6 +549,24 @@ class TestGlb:
         )
         with pytest.raises(FileError, match="its texture coordinates are whole numbers"):
             read_mesh(save(tmp_path / "a.glb", data))
+
+    def test_colors_of_one_number(self, tmp_path):
+        box = trimesh.creation.box()
+        material = PBRMaterial()
+        box.visual = TextureVisuals(uv=np.zeros((8, 2)), material=material)
+        box.visual.vertex_attributes["color"] = np.full((8, 4), 90, np.uint8)
+        tree, rest = glb_tree(box.export(file_type="glb"))
+        tree["accessors"][tree["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"]]["type"] = "SCALAR"
+        with pytest.raises(FileError, match="it is damaged"):
+            read_mesh(save(tmp_path / "a.glb", glb_of(tree, rest)))
+
+    def test_uvs_of_three_numbers(self, tmp_path):
+        data = textured_box("red")[0].export(file_type="glb")
+        tree, rest = glb_tree(data)
+        attributes = tree["meshes"][0]["primitives"][0]["attributes"]
+        attributes["TEXCOORD_0"] = attributes["POSITION"]
+        with pytest.raises(FileError, match="it is damaged"):
+            read_mesh(save(tmp_path / "a.glb", glb_of(tree, rest)))
 
     def test_index_out_of_range(self, tmp_path):
         data = trimesh.creation.box().export(file_type="glb")
