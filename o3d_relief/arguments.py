@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from o3d_relief import __version__
+from o3d_relief.limits import MAX_TRIANGLES
 from o3d_relief.params import ReliefParams, View
 
 __all__ = ["chosen_params", "chosen_view", "parse"]
@@ -110,6 +111,9 @@ def _parser() -> argparse.ArgumentParser:
     make.add_argument("--stages", type=Path, metavar="DIR", help="write a picture of each stage")
     make.add_argument(
         "--strict", action="store_true", help="refuse a relief that does not keep what the certificate tests"
+    )
+    make.add_argument(
+        "--max-triangles", type=int, metavar="N", help=f"refuse larger meshes (default: {MAX_TRIANGLES})"
     )
 
     demo = commands.add_parser(

@@ -8,6 +8,7 @@ import signal
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -49,13 +50,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options = parse(given)
         {"make": _make, "demo": _demo}[options.command](options)
     except ReliefError as error:
-        sys.stderr.write(f"o3d-relief: error: {error}\n")
+        _tell(f"o3d-relief: error: {error}")
+        return 2
+    except MemoryError:
+        _tell("o3d-relief: error: the memory is used up: reduce the mesh, or use a machine with more memory.")
         return 2
     except (KeyboardInterrupt, ImportError):
         # An interrupted import of Open3D arrives as an ImportError.
         if not signals:
             raise
-        sys.stderr.write("o3d-relief: interrupted; no file is left half-written.\n")
+        _tell("o3d-relief: interrupted; no file is left half-written.")
         return 128 + signals[0]
     finally:
         for number, handler in before.items():
@@ -64,8 +68,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _tell(text: str) -> None:
-    sys.stderr.write(text + "\n")
-    sys.stderr.flush()
+    if sys.stderr is None:  # closed when the program was started
+        return
+    # Where nobody reads on, the work still goes on.
+    with suppress(BrokenPipeError):
+        sys.stderr.write(text + "\n")
+        sys.stderr.flush()
 
 
 def _tell_stage(record: StageRecord) -> None:
@@ -79,15 +87,19 @@ def _make(options: argparse.Namespace) -> None:
     _check_places(options)
 
     from o3d_relief.pipeline import make_relief
-    from o3d_relief.scene.read import read_mesh
-    from o3d_relief.scene.write import check_writable, write_mesh
+    from o3d_relief.scene.read import read_mesh_and_notes
+    from o3d_relief.scene.write import check_writable, lost_attributes, write_mesh
 
     check_writable(options.output)
     started = time.perf_counter()
-    mesh = read_mesh(options.input)
+    mesh, notes = read_mesh_and_notes(options.input)
     _tell(f"{options.input}: {len(mesh.vertices)} vertices, {len(mesh.triangles)} triangles")
+    for note in [*notes, *lost_attributes(options.output, mesh)]:
+        _tell(note)
     try:
-        relief = make_relief(mesh, params, view=view, on_stage=_tell_stage)
+        relief = make_relief(
+            mesh, params, view=view, on_stage=_tell_stage, max_triangles=options.max_triangles
+        )
     except MeshError as error:
         raise MeshError(f"{options.input}: {error}") from error
     if options.strict and relief.certificate.failures:

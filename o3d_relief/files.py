@@ -42,7 +42,8 @@ def check_place(path: str | Path) -> None:
     Raises
     ------
     FileError
-        A folder in place of a file, a folder that is missing or in which nothing can be written.
+        A folder in place of a file, a file that is read-only, a folder that is missing or in which nothing
+        can be written.
     """
     path = Path(path)
     try:
@@ -60,6 +61,8 @@ def _check(path: Path) -> None:
         raise FileError(f"{path} cannot be written, the folder {path.parent} is missing: make it first.")
     if not path.parent.is_dir():
         raise FileError(f"{path} cannot be written, {path.parent} is not a folder: choose another place.")
+    if path.exists() and not os.access(path, os.W_OK):
+        raise FileError(f"{path} cannot be written, it is read-only: choose another name.")
     if not os.access(path.parent, os.W_OK | os.X_OK):
         raise FileError(
             f"{path} cannot be written, the folder {path.parent} is read-only: choose another one."

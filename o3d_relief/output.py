@@ -8,7 +8,8 @@ import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
-from o3d_relief.scene.weld import first_of_equal_rows
+from o3d_relief.scene.arrays import mended
+from o3d_relief.scene.weld import same_places
 from o3d_relief.stages.trim import Trimmed
 
 __all__ = ["smooth_normals", "trimmed_mesh"]
@@ -17,32 +18,41 @@ _CREASE = 0.866
 """Cosine of 30 degrees: normals at one place that differ more from their mean stay apart."""
 
 
-def trimmed_mesh(mesh: o3d.geometry.TriangleMesh, trimmed: Trimmed) -> o3d.geometry.TriangleMesh:
+def trimmed_mesh(
+    mesh: o3d.geometry.TriangleMesh, trimmed: Trimmed, unit: float
+) -> tuple[o3d.geometry.TriangleMesh, int]:
     """Build the output mesh and carry the input's attributes over to it.
 
     Vertex colours and triangle UVs are interpolated along the cut, textures and material ids kept, and
-    vertex normals computed anew.
+    vertex normals computed anew. Attributes whose length does not fit the mesh are left out. Colours that
+    are not finite become white, such texture coordinates the middle of the texture.
 
     Parameters
     ----------
     mesh : open3d.geometry.TriangleMesh
         The input, whose vertex and triangle numbers `trimmed` refers to.
     trimmed : Trimmed
+    unit : float
+        Length of one relief unit, in the unit of the mesh.
 
     Returns
     -------
-    open3d.geometry.TriangleMesh
+    mesh : open3d.geometry.TriangleMesh
+    mended : int
+        Colours and texture coordinates of the input that were replaced.
     """
     result = o3d.geometry.TriangleMesh(
         o3d.utility.Vector3dVector(trimmed.vertices),
         o3d.utility.Vector3iVector(trimmed.faces.astype(np.int32)),
     )
     faces = np.asarray(mesh.triangles, dtype=np.int64)
+    bad_colors = bad_uvs = 0
     if mesh.has_vertex_colors():
-        colors = trimmed.to_vertices(np.asarray(mesh.vertex_colors))
-        result.vertex_colors = o3d.utility.Vector3dVector(colors)
+        colors, bad_colors = mended(np.asarray(mesh.vertex_colors), 1.0)
+        result.vertex_colors = o3d.utility.Vector3dVector(trimmed.to_vertices(colors))
     if mesh.has_triangle_uvs():
-        uvs = trimmed.to_corners(faces, np.asarray(mesh.triangle_uvs).reshape(-1, 3, 2))
+        uvs, bad_uvs = mended(np.asarray(mesh.triangle_uvs), 0.5)
+        uvs = trimmed.to_corners(faces, uvs.reshape(-1, 3, 2))
         result.triangle_uvs = o3d.utility.Vector2dVector(uvs.reshape(-1, 2))
     if mesh.has_triangle_material_ids():
         ids = np.asarray(mesh.triangle_material_ids)[trimmed.face_from]
@@ -53,9 +63,9 @@ def trimmed_mesh(mesh: o3d.geometry.TriangleMesh, trimmed: Trimmed) -> o3d.geome
         o3d.geometry.Image() if image.is_empty() else o3d.geometry.Image(np.array(image))
         for image in mesh.textures
     ]
-    normals = smooth_normals(trimmed.vertices, trimmed.faces)
+    normals = smooth_normals(trimmed.vertices / unit, trimmed.faces)
     result.vertex_normals = o3d.utility.Vector3dVector(normals)
-    return result
+    return result, bad_colors + bad_uvs
 
 
 def smooth_normals(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -67,6 +77,7 @@ def smooth_normals(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> N
     Parameters
     ----------
     vertices : (n, 3) float64
+        In relief units.
     faces : (m, 3) int64
 
     Returns
@@ -83,7 +94,7 @@ def smooth_normals(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> N
         ],
         axis=1,
     )
-    first = first_of_equal_rows(vertices)
+    first = same_places(vertices, faces)
     shared = np.stack(
         [np.bincount(first, weights=along, minlength=len(vertices)) for along in own.T], axis=1
     )[first]

@@ -173,6 +173,7 @@ def make_relief(
     *,
     view: View | None = None,
     on_stage: OnStage | None = None,
+    max_triangles: int | None = None,
 ) -> Relief:
     """Make a high relief of a scene.
 
@@ -188,6 +189,8 @@ def make_relief(
         Where the scene faces; by default z is towards the viewer and y up.
     on_stage : callable, optional
         Called with each stage's record as soon as the stage is done.
+    max_triangles : int, optional
+        Larger meshes are refused; 10,000,000 where omitted.
 
     Returns
     -------
@@ -196,7 +199,7 @@ def make_relief(
     Raises
     ------
     MeshError
-        A mesh from which no relief can be made.
+        A mesh from which no relief can be made, or too large a one.
     ParameterError
         A parameter that does not fit the scene.
     SolverError
@@ -215,7 +218,7 @@ def make_relief(
             raise ParameterError(f"{name} must be a {kind.__name__}. Got {value!r} instead.")
     journal = _Journal(on_stage)
 
-    in_vertices, in_faces = mesh_arrays(mesh)
+    in_vertices, in_faces = mesh_arrays(mesh, max_triangles)
     frame = frame_step(in_vertices, in_faces, view)
     scene = journal.keep(scene_step(in_vertices, in_faces, frame, params))
     faces = scene.faces
@@ -236,7 +239,7 @@ def make_relief(
     trimmed = trim_step(in_vertices, out_faces, frame, scene, vertices, z)
     if len(trimmed.faces) == 0:
         raise MeshError("Nothing of the scene is left in front of the relief plane.")
-    relief_mesh = trimmed_mesh(mesh, trimmed)
+    relief_mesh, attributes_mended = trimmed_mesh(mesh, trimmed, frame.unit)
     journal.keep(
         TrimStage(
             counts={
@@ -246,6 +249,7 @@ def make_relief(
                 "faces_dropped": trimmed.faces_dropped,
                 "cut_vertices": int((trimmed.source_index < 0).sum()),
                 "faces_turned": turned,
+                "attributes_mended": attributes_mended,
             }
         )
     )

@@ -81,6 +81,8 @@ class SceneStage(StageRecord):
         Welded faces without degenerate and duplicate ones.
     welded_index : (n_in,) int64
         Welded vertex of each input vertex, -1 for one that no kept face uses.
+    welded_face : (m_in,) int64
+        Welded face of each input face, -1 for a degenerate one.
     unit : float
         Length of one relief unit in the input's unit.
     """
@@ -89,6 +91,7 @@ class SceneStage(StageRecord):
     vertices: NDArray[np.float64]
     faces: NDArray[np.int64]
     welded_index: NDArray[np.int64]
+    welded_face: NDArray[np.int64]
     unit: float
 
 

@@ -26,8 +26,9 @@ from o3d_relief.records import (
     SceneStage,
     VisibilityStage,
 )
-from o3d_relief.scene.frame import Frame, relief_frame, to_relief_units
+from o3d_relief.scene.frame import RELIEF_UNITS, Frame, relief_frame, to_relief_units
 from o3d_relief.scene.weld import weld
+from o3d_relief.scene.winding import wrongly_wound
 from o3d_relief.stages.attenuation import (
     actions,
     attenuate,
@@ -55,6 +56,9 @@ from o3d_relief.stages.visibility import turned_away, visible_vertices
 
 _KEPT_ON_PLANE = 0.2
 """Share of its height above its surroundings that what is visible keeps where it would be pressed onto S."""
+
+_OUT_OF_SHAPE = 1e3
+"""A forced perspective that makes the scene larger or smaller by more than this leaves nothing of it."""
 
 _ON_PLANE = 1e-9
 """Heights within this of S, in relief units, lie on it: rounding errors leave no slivers at the cut."""
@@ -87,6 +91,7 @@ def scene_step(
         vertices=welded.vertices,
         faces=welded.faces,
         welded_index=welded.index,
+        welded_face=welded.face_index,
         unit=frame.unit,
         counts={
             "input_vertices": len(in_vertices),
@@ -106,7 +111,14 @@ def perspective_step(vertices: NDArray[np.float64], view: View) -> PerspectiveSt
     if view.vanishing_point is None:
         return PerspectiveStage(vertices=vertices)
     plane = None if view.viewpoint is None else view.viewpoint[2]
-    return PerspectiveStage(vertices=forced_perspective(vertices, view.vanishing_point, view_plane=plane))
+    drawn = forced_perspective(vertices, view.vanishing_point, view_plane=plane)
+    extent = float(np.ptp(drawn[:, :2], axis=0).max())
+    if not RELIEF_UNITS / _OUT_OF_SHAPE <= extent <= RELIEF_UNITS * _OUT_OF_SHAPE:
+        raise ParameterError(
+            f"vanishing_point must leave the scene its shape: it would be {extent:.2g} relief units large. "
+            f"Got {view.vanishing_point} instead: choose one further behind, or a viewpoint closer by."
+        )
+    return PerspectiveStage(vertices=drawn)
 
 
 def visibility_step(vertices: NDArray[np.float64], faces: NDArray[np.int64], view: View) -> VisibilityStage:
@@ -353,9 +365,14 @@ def turned_to_viewer(
     visible: NDArray[np.bool_],
     laplacian: sp.csr_array,
 ) -> tuple[NDArray[np.int64], int]:
-    """Turn the faces of components that show their inside; return the faces and how many were turned."""
+    """Turn faces that disagree with their surface, and components that show their inside.
+
+    Return the faces and how many were turned. Of duplicate faces all are turned or none: where a surface has
+    both its sides, it keeps them.
+    """
     _, label = connected_components(laplacian, directed=False)
-    away = turned_away(vertices, scene.faces, visible, label)
-    welded = scene.welded_index[in_faces[:, 0]]
-    turn = (welded >= 0) & away[label[welded]]
+    wrong = wrongly_wound(vertices, scene.faces)
+    wound = np.where(wrong[:, None], scene.faces[:, [0, 2, 1]], scene.faces)
+    away = turned_away(vertices, wound, visible, label)
+    turn = np.append(wrong ^ away[label[scene.faces[:, 0]]], False)[scene.welded_face]  # -1 takes the last
     return np.where(turn[:, None], in_faces[:, [0, 2, 1]], in_faces), int(turn.sum())

@@ -11,6 +11,7 @@ import pytest
 
 from o3d_relief.cli import main
 from o3d_relief.scene.read import read_mesh
+from o3d_relief.scene.write import write_mesh
 from shapes import bust, grid, hills, to_mesh
 
 
@@ -126,6 +127,29 @@ def test_nothing_is_overwritten_by_mistake(tmp_path, scene, capsys):
     assert "is the input" in _fails(capsys, "make", scene, out, "--report", scene)
     assert "is a file" in _fails(capsys, "make", scene, out, "--stages", scene)
     assert scene.read_bytes() == content
+    assert _files(tmp_path) == ["scene.ply"]
+
+
+def test_what_is_left_out_is_said(tmp_path, scene, capsys):
+    mesh = read_mesh(scene)
+    mesh.triangle_uvs = o3d.utility.Vector2dVector(np.full((3 * len(mesh.triangles), 2), 0.5))
+    mesh.textures = [o3d.geometry.Image(np.full((2, 2, 3), 9, np.uint8))]
+    path = tmp_path / "a.obj"
+    write_mesh(path, mesh)
+    out = tmp_path / "r.stl"
+    assert main(["make", str(path), str(out), "-k", "8", "--no-in-order"]) == 0
+    assert f"{out} will have no textures: STL cannot hold them; OBJ and GLB can" in capsys.readouterr().err
+    (tmp_path / "a.mtl").unlink()
+    assert main(["make", str(path), str(out), "-k", "8", "--no-in-order"]) == 0
+    told = capsys.readouterr().err
+    assert f"{path} names a.mtl, which cannot be read: what it colours is left plain" in told
+    assert "cannot hold" not in told
+
+
+def test_larger_than_accepted(tmp_path, scene, capsys):
+    words = ["make", scene, tmp_path / "r.ply", "--max-triangles", "100"]
+    assert "triangles, more than the 100 that are accepted" in _fails(capsys, *words)
+    assert "max_triangles must be a whole number" in _fails(capsys, *words[:-1], "0")
     assert _files(tmp_path) == ["scene.ply"]
 
 

@@ -11,10 +11,14 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     import open3d as o3d
 
-__all__ = ["WHITE", "MeshArrays", "from_open3d", "to_open3d"]
+__all__ = ["WHITE", "MeshArrays", "from_open3d", "mended", "to_open3d"]
 
 WHITE = np.full((1, 1, 3), 255, dtype=np.uint8)
 """The texture of a material that has none: colour = texture * vertex colour then holds everywhere."""
+
+
+_LARGEST = 1e30
+"""Colours and texture coordinates beyond this do not count as numbers; float32 ends at 3e38."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,6 +41,8 @@ class MeshArrays:
         Index into `textures` for each face. None without textures.
     textures : tuple of (h, w, 3) uint8
         Row 0 is the bottom (v = 0), as Open3D's own OBJ reader keeps them.
+    missing : tuple of str
+        Files of materials and textures that the file names and that could not be read.
     """
 
     vertices: NDArray[np.float64]
@@ -46,6 +52,7 @@ class MeshArrays:
     triangle_uvs: NDArray[np.float64] | None = None
     material_ids: NDArray[np.int64] | None = None
     textures: tuple[NDArray[np.uint8], ...] = ()
+    missing: tuple[str, ...] = ()
 
 
 def to_open3d(arrays: MeshArrays) -> o3d.geometry.TriangleMesh:
@@ -84,11 +91,37 @@ def to_open3d(arrays: MeshArrays) -> o3d.geometry.TriangleMesh:
     return mesh
 
 
+def mended(values: NDArray[np.float64], stand_in: float) -> tuple[NDArray[np.float64], int]:
+    """Replace the rows of an attribute that are not finite, or too large to be meant.
+
+    Parameters
+    ----------
+    values : (n, c) float64
+    stand_in : float
+        For colours 1, white; for texture coordinates 0.5, the middle of the texture.
+
+    Returns
+    -------
+    values : (n, c) float64
+    count : int
+        Rows that were replaced.
+
+    Examples
+    --------
+    >>> mended(np.array([[0.2, np.nan], [0.3, 0.4]]), 1.0)
+    (array([[1. , 1. ],
+           [0.3, 0.4]]), 1)
+    """
+    usable = np.asarray((np.abs(values) <= _LARGEST).all(axis=1))
+    return np.where(usable[:, None], values, stand_in), int((~usable).sum())
+
+
 def from_open3d(mesh: o3d.geometry.TriangleMesh) -> MeshArrays:
     """Copy an Open3D mesh into arrays.
 
-    Attributes whose length does not fit the mesh are left out. Material ids without a texture, and
-    textures without a pixel, become a white texture.
+    Attributes whose length does not fit the mesh are left out, and normals that are not all finite. Colours
+    that are not finite become white, such texture coordinates the middle of the texture. Material ids
+    without a texture, and textures without a pixel, become a white texture.
 
     Parameters
     ----------
@@ -123,9 +156,9 @@ def from_open3d(mesh: o3d.geometry.TriangleMesh) -> MeshArrays:
     return MeshArrays(
         vertices=vertices,
         faces=faces,
-        colors=colors if len(colors) == len(vertices) > 0 else None,
-        normals=normals if len(normals) == len(vertices) > 0 else None,
-        triangle_uvs=uvs if len(uvs) == 3 * len(faces) > 0 else None,
+        colors=mended(colors, 1.0)[0] if len(colors) == len(vertices) > 0 else None,
+        normals=normals if len(normals) == len(vertices) > 0 and np.isfinite(normals).all() else None,
+        triangle_uvs=mended(uvs, 0.5)[0] if len(uvs) == 3 * len(faces) > 0 else None,
         material_ids=ids if textured else None,
         textures=tuple(textures) if textured else (),
     )

@@ -7,17 +7,25 @@ import open3d as o3d
 from numpy.typing import NDArray
 
 from o3d_relief.errors import MeshError
+from o3d_relief.limits import check_triangles
 
 __all__ = ["mesh_arrays"]
 
+_LARGEST = 1e50
+"""Squared areas of larger scenes, and of scenes smaller than the inverse, leave the range of float64."""
 
-def mesh_arrays(mesh: o3d.geometry.TriangleMesh) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+
+def mesh_arrays(
+    mesh: o3d.geometry.TriangleMesh, max_triangles: int | None = None
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Copy vertices and faces out of an Open3D mesh and check them.
 
     Parameters
     ----------
     mesh : open3d.geometry.TriangleMesh
         Never modified.
+    max_triangles : int, optional
+        Larger meshes are refused; 10,000,000 where omitted.
 
     Returns
     -------
@@ -26,13 +34,16 @@ def mesh_arrays(mesh: o3d.geometry.TriangleMesh) -> tuple[NDArray[np.float64], N
 
     Raises
     ------
+    ParameterError
+        `max_triangles` is not a positive whole number.
     MeshError
-        Not a TriangleMesh, no vertices, no triangles, vertices of faces that are not finite, or indices
-        out of range.
+        Not a TriangleMesh, too large for `max_triangles` or for the memory, no vertices, no triangles,
+        indices out of range, or vertices of faces that are not finite or too large or small to compute with.
     """
     if not isinstance(mesh, o3d.geometry.TriangleMesh):
         kind = f"{type(mesh).__module__}.{type(mesh).__qualname__}"
         raise MeshError(f"The scene must be an open3d.geometry.TriangleMesh. Got a {kind} instead.")
+    check_triangles(len(mesh.triangles), max_triangles)
     vertices = np.array(mesh.vertices, dtype=np.float64).reshape(-1, 3)
     faces = np.array(mesh.triangles, dtype=np.int64).reshape(-1, 3)
     if len(vertices) == 0:
@@ -46,10 +57,29 @@ def mesh_arrays(mesh: o3d.geometry.TriangleMesh) -> tuple[NDArray[np.float64], N
             f"A triangle names vertex {wrong}, but the mesh has the vertices 0 to {len(vertices) - 1}: "
             "the mesh is damaged."
         )
-    bad = int((~np.isfinite(vertices[faces]).all(axis=(1, 2))).sum())
-    if bad:
+    used = np.zeros(len(vertices), dtype=bool)
+    used[faces] = True
+    finite = np.asarray(np.isfinite(vertices).all(axis=1))
+    if not finite[used].all():
+        bad = int((~finite[faces]).any(axis=1).sum())
         raise MeshError(
             f"The mesh has vertices that are not finite numbers, in {bad} of its {len(faces)} triangles: "
             "remove these first."
         )
+    _check_size(vertices[used])
     return vertices, faces
+
+
+def _check_size(used: NDArray[np.float64]) -> None:
+    largest = float(np.abs(used).max())
+    if largest > _LARGEST:
+        raise MeshError(
+            f"The mesh has coordinates up to {largest:.0e}, and {_LARGEST:.0e} is the most that can be "
+            "computed with: scale it down first."
+        )
+    extent = float(np.ptp(used, axis=0).max())
+    if 0.0 < extent < 1.0 / _LARGEST:
+        raise MeshError(
+            f"The mesh is only {extent:.0e} large, and {1.0 / _LARGEST:.0e} is the least that can be "
+            "computed with: scale it up first."
+        )

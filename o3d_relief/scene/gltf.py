@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from o3d_relief.errors import FileError
+from o3d_relief.limits import memory_for
 from o3d_relief.scene.arrays import WHITE, MeshArrays
 
 __all__ = ["decode_gltf"]
@@ -46,8 +47,8 @@ def decode_gltf(data: bytes, kind: str, resolver: Any, to_texture: Callable[[Any
         The file.
     kind : {"glb", "gltf"}
         Binary or JSON.
-    resolver : trimesh.resolvers.Resolver
-        Finds other files that the file names.
+    resolver
+        Finds other files that the file names: by `get(name)`, `[name]`, or raises an OSError.
     to_texture : callable
         Turns a PIL picture into a texture.
 
@@ -75,14 +76,32 @@ def decode_gltf(data: bytes, kind: str, resolver: Any, to_texture: Callable[[Any
     try:
         _check_header(header)
         loaded = loaders.mesh_loaders[kind](file_obj=wrap_as_stream(data), file_type=kind, resolver=resolver)
-        parts = [_place(geometry, matrix) for geometry, matrix in _walk(loaded) if "faces" in geometry]
+        placed = [(geometry, matrix) for geometry, matrix in _walk(loaded) if "faces" in geometry]
+        triangles = sum(len(geometry["faces"]) for geometry, _ in placed)
+        if not memory_for(triangles):  # a small file may show one mesh a million times
+            raise FileError(f"its nodes show {triangles:,} triangles, more than there is memory for")
+        parts = [_place(geometry, matrix) for geometry, matrix in placed]
     except FileError:
         raise
     # trimesh reads the JSON as it comes and checks little: a damaged file ends in a KeyError,
     # IndexError, ValueError, AssertionError, AttributeError, zlib.error, binascii.Error ..., by chance.
     except Exception as error:
         raise FileError("it is damaged, or a file that it names is missing") from error
-    return _join([part for part in parts if len(part.faces)], to_texture)
+    arrays = _join([part for part in parts if len(part.faces)], to_texture)
+    return replace(arrays, missing=_missing_images(header, resolver))
+
+
+def _missing_images(header: dict[str, Any], resolver: Any) -> tuple[str, ...]:
+    """Return the names of the pictures that are not there."""
+    missing = []
+    for image in header.get("images", []):
+        name = image.get("uri")
+        if isinstance(name, str) and not name.startswith("data:"):
+            try:
+                resolver.get(name)
+            except (OSError, ValueError):
+                missing.append(name)
+    return tuple(missing)
 
 
 def _read_header(data: bytes, kind: str) -> dict[str, Any]:
@@ -115,7 +134,11 @@ def _check_header(header: dict[str, Any]) -> None:
     floats = [accessor.get("componentType") == _FLOAT for accessor in accessors]
     for mesh in header.get("meshes", []):
         for primitive in mesh.get("primitives", []):
-            index = primitive.get("attributes", {}).get("TEXCOORD_0")
+            attributes = primitive.get("attributes", {})
+            for index in (attributes.get("POSITION"), primitive.get("indices")):
+                if isinstance(index, int) and "bufferView" not in accessors[index]:
+                    raise FileError("it has geometry without data, save it without compression")
+            index = attributes.get("TEXCOORD_0")
             if isinstance(index, int) and not all(floats[index : index + 1]):
                 raise FileError("its texture coordinates are whole numbers, save them as floats")
 
@@ -150,7 +173,10 @@ def _place(geometry: dict[str, Any], matrix: NDArray[np.float64]) -> _Part:
         normals = np.asarray(normals, dtype=np.float64) @ np.linalg.pinv(linear)
         lengths = np.linalg.norm(normals, axis=1, keepdims=True)
         normals = normals / np.where(lengths > 0.0, lengths, 1.0)
-    colors, uvs, image = _read_material(geometry, len(vertices))
+    n = len(vertices)
+    colors, uvs, image = _read_material(geometry, n)
+    if (colors is not None and colors.shape != (n, 3)) or (uvs is not None and uvs.shape != (n, 2)):
+        raise FileError("it is damaged")
     return _Part(
         vertices=vertices @ linear.T + matrix[:3, 3],
         faces=faces,

@@ -28,12 +28,14 @@ class Material:
 class Dress:
     """How faces are coloured: by textures, or all in one colour, or (all None) not at all.
 
-    ids (f,) int64 or None: the texture of each face; textures; color of all vertices or None.
+    ids (f,) int64 or None: the texture of each face; textures; color of all vertices or None; missing:
+    names of textures that could not be read.
     """
 
     ids: NDArray[np.int64] | None = None
     textures: tuple[NDArray[np.uint8], ...] = ()
     color: Color | None = None
+    missing: tuple[str, ...] = ()
 
 
 def decode_mtl(data: bytes) -> dict[str, Material]:
@@ -112,10 +114,13 @@ def dress_faces(
     slots: dict[str | Color | None, int] = {}
     textures: list[NDArray[np.uint8]] = []
     slot_of = {}
+    missing: list[str] = []
     pictures = 0
     for name in used:
         material = materials.get(name, Material())
         picture = read_texture(material.texture) if material.texture and has_uvs else None
+        if picture is None and material.texture and has_uvs:
+            missing.append(material.texture)
         key = material.color if picture is None else material.texture
         if key not in slots:
             slots[key] = len(textures)
@@ -124,8 +129,9 @@ def dress_faces(
         slot_of[name] = slots[key]
     if pictures == 0 and len(slots) <= 1:
         color = next(iter(slots), None)
-        return Dress(color=None if isinstance(color, str) else color)
-    return Dress(ids=np.array([slot_of[name] for name in names], dtype=np.int64), textures=tuple(textures))
+        return Dress(color=None if isinstance(color, str) else color, missing=tuple(missing))
+    ids = np.array([slot_of[name] for name in names], dtype=np.int64)
+    return Dress(ids=ids, textures=tuple(textures), missing=tuple(missing))
 
 
 def _to_pixel(color: Color | None) -> NDArray[np.uint8]:

@@ -79,9 +79,7 @@ def decode_obj(
     if lines.vt and (corners[:, 1] >= 0).any():
         rows = np.vstack([to_table(lines.vt, 2)[:, :2], [[0.5, 0.5]]])  # -1: no texture coordinate
         uvs = rows[corners[:, 1][triangles]].reshape(-1, 2)
-    materials: dict[str, Material] = {}
-    for name in lines.libraries:
-        materials |= decode_mtl(read_file(name) or b"")
+    materials, missing = _read_materials(lines.libraries, read_file)
     dress = dress_faces(lines.material, materials, uvs is not None, read_texture)
     colors = _read_colors(table)
     if colors is None and dress.color is not None:
@@ -96,6 +94,7 @@ def decode_obj(
         triangle_uvs=uvs,
         material_ids=None if dress.ids is None else np.repeat(dress.ids, counts - 2),
         textures=dress.textures,
+        missing=missing + dress.missing,
     )
 
 
@@ -107,7 +106,7 @@ def _sort_lines(text: str) -> _Lines:
         if key == "usemtl":
             material = rest.strip()
         elif key == "mtllib":
-            lines.libraries += [rest.strip()] if rest.count(".") < 2 else [rest.strip(), *rest.split()]
+            lines.libraries.append(rest.strip())
         elif key in ("v", "vt", "vn", "f"):
             content = rest.split("#", 1)[0] if "#" in rest else rest
             if key == "f":
@@ -116,6 +115,23 @@ def _sort_lines(text: str) -> _Lines:
                 lines.material.append(material)
             getattr(lines, key).append(content)
     return lines
+
+
+def _read_materials(
+    libraries: list[str], read_file: Callable[[str], bytes | None]
+) -> tuple[dict[str, Material], tuple[str, ...]]:
+    """Return the materials by name, and the libraries that are missing."""
+    materials: dict[str, Material] = {}
+    missing: list[str] = []
+    for line in filter(None, dict.fromkeys(libraries)):
+        # One name with spaces in it, or several names.
+        content = read_file(line)
+        names = [line] if content is not None or line.count(".") < 2 else line.split()
+        for name in names:
+            content = read_file(name)
+            materials |= decode_mtl(content or b"")
+            missing += [name] if content is None else []
+    return materials, tuple(missing)
 
 
 def _read_corners(lines: _Lines, counts: NDArray[np.int64]) -> NDArray[np.int64]:

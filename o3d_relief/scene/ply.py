@@ -55,7 +55,8 @@ def decode_ply(data: bytes, read_texture: Callable[[str], NDArray[np.uint8] | No
     if not all(axis in vertex for axis in "xyz"):
         raise FileError("it has no vertices with x, y and z")
     faces, uvs, ids = _read_faces(tables, vertex)
-    textures = tuple(texture for name in names if (texture := read_texture(name)) is not None)
+    found = {name: read_texture(name) for name in names}
+    textures = tuple(texture for name in names if (texture := found[name]) is not None)
     textured = len(textures) == len(names) > 0 and uvs is not None and ids.max(initial=0) < len(textures)
     return MeshArrays(
         vertices=_stack(vertex, ("x", "y", "z")),
@@ -65,11 +66,20 @@ def decode_ply(data: bytes, read_texture: Callable[[str], NDArray[np.uint8] | No
         triangle_uvs=uvs,
         material_ids=ids if textured else None,
         textures=textures if textured else (),
+        missing=tuple(name for name in found if found[name] is None) if uvs is not None else (),
     )
 
 
 def _stack(columns: Columns, names: tuple[str, ...]) -> NDArray[np.float64]:
-    return np.stack([columns[name].astype(np.float64) for name in names], axis=1)
+    with np.errstate(invalid="ignore"):  # a signalling NaN
+        return np.stack([columns[name].astype(np.float64) for name in names], axis=1)
+
+
+def _whole(column: NDArray[np.generic]) -> NDArray[np.int64]:
+    """Return indices; some files store them as floats."""
+    if column.dtype.kind == "f" and not (np.abs(column.astype(np.float64)) < 2.0**53).all():
+        raise FileError("it has an index that is not a number")
+    return column.astype(np.int64)
 
 
 def _read_faces(
@@ -81,14 +91,12 @@ def _read_faces(
     name = next((name for name in ("vertex_indices", "vertex_index") if f"{name}#" in face), "")
     if not name:
         strip = tables.get("tristrips", {}).get("vertex_indices")
-        faces = none if strip is None else strips(strip.astype(np.int64))
+        faces = none if strip is None else strips(_whole(strip))
         return faces, _read_vertex_uvs(vertex, faces), np.zeros(len(faces), dtype=np.int64)
     counts = face[f"{name}#"].astype(np.int64)
     corners = fan(counts)
-    faces = face[name].astype(np.int64)[corners] if len(corners) else none
-    numbers = (
-        face["texnumber"].astype(np.int64) if "texnumber" in face else np.zeros(len(counts), dtype=np.int64)
-    )
+    faces = _whole(face[name])[corners] if len(corners) else none
+    numbers = _whole(face["texnumber"]) if "texnumber" in face else np.zeros(len(counts), dtype=np.int64)
     ids = np.repeat(numbers, np.maximum(counts - 2, 0))
     if "texcoord#" in face and np.array_equal(face["texcoord#"].astype(np.int64), 2 * counts):
         return faces, face["texcoord"].astype(np.float64).reshape(-1, 2)[corners].reshape(-1, 2), ids

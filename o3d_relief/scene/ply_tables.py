@@ -95,7 +95,7 @@ def _read_header(data: bytes) -> tuple[str, list[_Element], list[str], int]:
                 elements[-1].properties.append(_Property(name, _TYPES[kind], _TYPES[count]))
             case ["property", kind, name] if kind in _TYPES and elements:
                 elements[-1].properties.append(_Property(name, _TYPES[kind]))
-            case ["comment", "TextureFile", *_]:
+            case ["comment", "TextureFile", _, *_]:
                 textures.append(line.split(None, 2)[2])
             case ["end_header"] if order:
                 _check_names(elements)

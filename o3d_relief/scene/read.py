@@ -6,11 +6,13 @@ import warnings
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from urllib.parse import unquote
 
 import numpy as np
 from numpy.typing import NDArray
 
 from o3d_relief.errors import FileError, MeshError
+from o3d_relief.limits import check_file_size
 from o3d_relief.scene.arrays import MeshArrays, to_open3d
 from o3d_relief.scene.gltf import decode_gltf
 from o3d_relief.scene.obj import decode_obj
@@ -21,7 +23,7 @@ from o3d_relief.scene.stl import decode_stl
 if TYPE_CHECKING:
     import open3d as o3d
 
-__all__ = ["READABLE", "read_mesh"]
+__all__ = ["READABLE", "read_mesh", "read_mesh_and_notes"]
 
 READABLE = (".ply", ".obj", ".stl", ".off", ".glb", ".gltf")
 """The file endings that `read_mesh` reads."""
@@ -51,13 +53,36 @@ def read_mesh(path: str | Path) -> o3d.geometry.TriangleMesh:
     Raises
     ------
     FileError
-        The file is missing, unreadable, damaged, too short, or of a format that is not read.
+        The file is missing, unreadable, damaged, too short, of a format that is not read, or so large that
+        reading it would need more memory than there is.
     MeshError
         The file has no triangles, for instance because it is a point cloud.
 
     Examples
     --------
     >>> mesh = read_mesh("box.ply")  # doctest: +SKIP
+    """
+    return read_mesh_and_notes(path)[0]
+
+
+def read_mesh_and_notes(path: str | Path) -> tuple[o3d.geometry.TriangleMesh, list[str]]:
+    """Read a mesh like `read_mesh`, and say what of the file was left out.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Returns
+    -------
+    mesh : open3d.geometry.TriangleMesh
+    notes : list of str
+        A sentence each, none as a rule.
+
+    Raises
+    ------
+    FileError, MeshError
+        As by `read_mesh`.
     """
     path = Path(path)
     data = _read_bytes(path)
@@ -69,7 +94,10 @@ def read_mesh(path: str | Path) -> o3d.geometry.TriangleMesh:
     if len(arrays.faces) == 0:
         what = f"only {len(arrays.vertices)} points" if len(arrays.vertices) else "nothing in it"
         raise MeshError(f"{path} has no triangles, {what}: a relief needs a mesh, so make one first.")
-    return to_open3d(arrays)
+    notes = [
+        f"{path} names {name}, which cannot be read: what it colours is left plain" for name in arrays.missing
+    ]
+    return to_open3d(arrays), notes
 
 
 def _read_bytes(path: Path) -> bytes:
@@ -80,6 +108,9 @@ def _read_bytes(path: Path) -> bytes:
             raise FileError(f"{path} does not exist: check its name and folder.")
         if path.suffix.lower() not in READABLE:
             raise FileError(f"{path} cannot be read: its ending must be one of {', '.join(READABLE)}.")
+        if not path.is_file():
+            raise FileError(f"{path} cannot be read: it is a device or a pipe. Save it as a file first.")
+        check_file_size(path, path.stat().st_size)
         data = path.read_bytes()
     except FileError:
         raise
@@ -108,18 +139,38 @@ def _decode(path: Path, data: bytes) -> MeshArrays:
         return decode_stl(data)
     if kind == "off":
         return decode_off(data)
-    from trimesh.resolvers import FilePathResolver
+    return decode_gltf(data, kind, _Neighbours(path.parent), _to_texture)
 
-    return decode_gltf(data, kind, FilePathResolver(str(path.absolute())), _to_texture)
+
+class _Neighbours:
+    """Finds the files that a glTF file names, for trimesh."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def get(self, name: str) -> bytes:
+        content = _read_neighbour(self._folder, name)
+        if content is None:
+            content = _read_neighbour(self._folder, unquote(name))
+        if content is None:
+            raise FileNotFoundError(name)
+        return content
+
+    __getitem__ = get
 
 
 def _read_neighbour(folder: Path, name: str) -> bytes | None:
-    """Read a file that another one names; where its folder is unknown here, look beside the other one."""
+    """Read a file that another one names; where its folder is unknown here, look beside the other one.
+
+    None where there is none.
+    """
     name = name.strip().strip('"').replace("\\", "/")
     for place in (folder / name, folder / Path(name).name):
         try:
-            return place.read_bytes()
-        except (OSError, ValueError):
+            if place.is_file():  # a device would never end
+                check_file_size(place, place.stat().st_size)
+                return place.read_bytes()
+        except (OSError, ValueError):  # one that is too large for the memory, too
             continue
     return None
 

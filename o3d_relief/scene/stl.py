@@ -51,7 +51,8 @@ def decode_stl(data: bytes) -> MeshArrays:
         raise FileError(_TOO_SHORT)
     else:
         raise FileError("its length does not fit its number of triangles")
-    vertices = corners.astype(np.float64)
+    with np.errstate(invalid="ignore"):  # a signalling NaN
+        vertices = corners.astype(np.float64)
     return MeshArrays(vertices=vertices, faces=np.arange(len(vertices), dtype=np.int64).reshape(-1, 3))
 
 

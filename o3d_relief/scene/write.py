@@ -10,12 +10,12 @@ import numpy as np
 from o3d_relief.errors import FileError, MeshError
 from o3d_relief.files import check_place, write_files
 from o3d_relief.scene.arrays import MeshArrays, from_open3d
-from o3d_relief.scene.encode import encode_glb, encode_obj, encode_ply, encode_stl
+from o3d_relief.scene.encode import encode_mesh
 
 if TYPE_CHECKING:
     import open3d as o3d
 
-__all__ = ["WRITABLE", "check_writable", "write_mesh"]
+__all__ = ["WRITABLE", "check_writable", "lost_attributes", "write_mesh"]
 
 WRITABLE = (".ply", ".obj", ".stl", ".glb")
 """The file endings that `write_mesh` writes."""
@@ -45,6 +45,36 @@ def check_writable(path: str | Path) -> None:
     check_place(path)
 
 
+def lost_attributes(path: str | Path, mesh: o3d.geometry.TriangleMesh) -> list[str]:
+    """Say what of a mesh the format of a file cannot hold.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file to be written.
+    mesh : open3d.geometry.TriangleMesh
+
+    Returns
+    -------
+    list of str
+        A sentence, or nothing.
+
+    Examples
+    --------
+    >>> import open3d as o3d
+    >>> lost_attributes("relief.stl", o3d.geometry.TriangleMesh.create_box().paint_uniform_color((1, 0, 0)))
+    ['relief.stl will have no colours: STL cannot hold them; OBJ and GLB can']
+    """
+    ending = Path(path).suffix.lower()
+    textured = mesh.has_triangle_uvs() and mesh.has_textures()
+    lost = ["colours"] if ending == ".stl" and mesh.has_vertex_colors() else []
+    lost += ["textures"] if ending in (".stl", ".ply") and textured else []
+    if not lost:
+        return []
+    form = ending[1:].upper()
+    return [f"{path} will have no {' and no '.join(lost)}: {form} cannot hold them; OBJ and GLB can"]
+
+
 def write_mesh(path: str | Path, mesh: o3d.geometry.TriangleMesh) -> None:
     """Write a mesh as PLY, OBJ, STL or GLB, by the file's ending.
 
@@ -59,7 +89,8 @@ def write_mesh(path: str | Path, mesh: o3d.geometry.TriangleMesh) -> None:
     Parameters
     ----------
     path : str or Path
-        The file; it is replaced if it exists. Material and texture files of `b.obj` are `b.mtl`, `b_0.png`...
+        The file; it is replaced if it exists. Material and texture files of `b.obj` are `b.mtl`,
+        `b_0.png`...; their names have no spaces.
     mesh : open3d.geometry.TriangleMesh
         At least one triangle. Never modified.
 
@@ -79,17 +110,7 @@ def write_mesh(path: str | Path, mesh: o3d.geometry.TriangleMesh) -> None:
     path = Path(path)
     arrays = from_open3d(mesh)
     _check_arrays(path, arrays)
-    ending = path.suffix.lower()
-    if ending == ".obj":
-        files = encode_obj(arrays, path.stem)
-        files[path.name] = files.pop(f"{path.stem}.obj")
-    elif ending == ".ply":
-        files = {path.name: encode_ply(arrays)}
-    elif ending == ".stl":
-        files = {path.name: encode_stl(arrays)}
-    else:
-        files = {path.name: encode_glb(arrays)}
-    write_files(path, files)
+    write_files(path, encode_mesh(arrays, path.name))
 
 
 def _check_arrays(path: Path, arrays: MeshArrays) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o3d_relief.errors import MeshError
+from o3d_relief.scene.arrays import mended
 from o3d_relief.show.colors import to_linear
 from o3d_relief.show.normals import crease_normals, number_places
 
@@ -112,12 +113,12 @@ def read_surface(mesh: o3d.geometry.TriangleMesh, crease_degrees: float) -> Surf
     if _inside_out(corners[keep] / extent):
         normals = -normals
     uvs, texture_index, textures = _read_textures(mesh, keep)
-    colors = to_linear(np.asarray(mesh.vertex_colors)) if mesh.has_vertex_colors() else None
+    colors = to_linear(mended(np.asarray(mesh.vertex_colors), 1.0)[0]) if mesh.has_vertex_colors() else None
     return Surface(
         vertices=vertices,
         faces=faces[keep],
         normals=normals,
-        corner_normals=crease_normals(vertices, faces[keep], normals, crease_degrees),
+        corner_normals=crease_normals(vertices / extent, faces[keep], normals, crease_degrees),
         doubled=_doubled(number_places(vertices)[faces[keep]]),
         vertex_colors=colors,
         corner_uvs=uvs,
@@ -159,7 +160,7 @@ def _read_textures(
     usable = np.array([not image.is_empty() for image in mesh.textures], dtype=bool)
     if not mesh.has_triangle_uvs() or not np.any(usable):
         return None, None, ()
-    uvs = np.array(mesh.triangle_uvs, dtype=np.float32).reshape(-1, 3, 2)[keep]
+    uvs = mended(np.asarray(mesh.triangle_uvs), 0.5)[0].astype(np.float32).reshape(-1, 3, 2)[keep]
     chosen = np.array(mesh.triangle_material_ids, dtype=np.int64)
     chosen = chosen[keep] if len(chosen) == len(keep) else np.zeros(len(uvs), dtype=np.int64)
     inside = (chosen >= 0) & (chosen < len(textures))

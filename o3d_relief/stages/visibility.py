@@ -55,7 +55,9 @@ def visible_vertices(
     rays[:, 5] = 1.0
     if viewpoint is not None:
         towards = (np.asarray(viewpoint, dtype=np.float64) - vertices) / size
-        # Past the scene's front nothing can be hit: unit directions keep the offset of a far u small.
+        # Past the scene's front nothing can be hit: unit directions keep the offset of a far u small. The
+        # squares of a very far one must not overflow.
+        towards /= np.abs(towards).max(axis=1, keepdims=True)
         towards /= np.linalg.norm(towards, axis=1, keepdims=True)
         rays[:, 3:] = towards
     rays[:, :3] = ((vertices - middle) / size).astype(np.float32) + np.float32(_NEAR) * rays[:, 3:]

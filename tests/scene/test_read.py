@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import struct
 
 import numpy as np
@@ -13,7 +14,7 @@ from trimesh.visual.material import PBRMaterial
 
 from o3d_relief.errors import FileError, MeshError
 from o3d_relief.scene.polygons import fan, strips
-from o3d_relief.scene.read import READABLE, read_mesh
+from o3d_relief.scene.read import READABLE, read_mesh, read_mesh_and_notes
 
 CORNERS = np.array(
     [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [7, 7, 7]], dtype=float
@@ -120,6 +121,55 @@ class TestPly:
         text = text[: text.index("4 0 1")] + "7 0 1 3 2 -1 0 1\n"
         assert faces_of(read_mesh(save(tmp_path / "a.ply", text))) == [[0, 1, 3], [3, 1, 2]]
 
+    @pytest.mark.parametrize("order", ["ascii", "binary_little_endian", "binary_big_endian"])
+    @pytest.mark.parametrize(
+        ("kind", "index"), [("short", "ushort"), ("int16", "short"), ("char", "uint8"), ("float", "double")]
+    )
+    def test_small_types_and_indices_as_floats(self, tmp_path, order, kind, index):
+        types = {"short": "i2", "int16": "i2", "char": "i1", "float": "f4"}
+        types |= {"ushort": "u2", "uint8": "u1", "double": "f8"}
+        header = PLY_HEADER.replace("double", kind).format(order) + PLY_FACES.replace("int", index, 1)
+        header = header.replace("vertex_uint8dices", "vertex_indices")
+        polygons = [[0, 1, 2, 3], [0, 1, 4]]
+        if order == "ascii":
+            rows = "".join("{:g} {:g} {:g}\n".format(*row) for row in CORNERS)
+            body = (rows + "".join(f"{len(p)} {' '.join(map(str, p))}\n" for p in polygons)).encode()
+        else:
+            sign = "<" if "little" in order else ">"
+            rows = CORNERS.astype(sign + types[kind]).tobytes()
+            body = rows + b"".join(
+                bytes([len(p)]) + np.array(p).astype(sign + types[index]).tobytes() for p in polygons
+            )
+        mesh = read_mesh(save(tmp_path / "a.ply", header.encode() + body))
+        np.testing.assert_array_equal(vertices_of(mesh), CORNERS)
+        assert faces_of(mesh) == [[0, 1, 2], [0, 2, 3], [0, 1, 4]]
+
+    def test_an_index_that_is_no_number(self, tmp_path):
+        text = ascii_ply("4 0 1 nan 3\n3 0 1 4\n").replace("uchar int", "uchar float")
+        with pytest.raises(FileError, match="it has an index that is not a number"):
+            read_mesh(save(tmp_path / "a.ply", text))
+
+    def test_a_signalling_nan_is_read_without_a_warning(self, tmp_path):
+        data = binary_ply("<", [(0, 1, 2)]).replace(b"double", b"float ")
+        start = data.index(b"end_header\n") + 11
+        floats = CORNERS.astype("<f4").view("<u4")
+        floats[4, 0] = 0x7F800001
+        mesh = read_mesh(save(tmp_path / "a.ply", data[:start] + floats.tobytes() + data[start + 120 :]))
+        assert np.isnan(vertices_of(mesh)[4, 0])
+
+    def test_a_texture_without_a_name_is_a_comment(self, tmp_path):
+        text = ascii_ply().replace("comment made here", "comment TextureFile")
+        assert len(read_mesh(save(tmp_path / "a.ply", text)).triangles) == 3
+
+    def test_missing_texture_is_noted(self, tmp_path):
+        header = PLY_HEADER.format("ascii").replace("made here", "TextureFile gone.png")
+        header = header.replace("comment made", "comment") + "property float s\nproperty float t\n"
+        rows = "".join(f"{x} {y} {z} 0 0\n" for x, y, z in CORNERS)
+        path = save(tmp_path / "a.ply", header + PLY_FACES + rows + "3 0 1 2\n3 0 2 3\n")
+        assert read_mesh_and_notes(path)[1] == [
+            f"{path} names gone.png, which cannot be read: what it colours is left plain"
+        ]
+
     def test_not_finite_vertices_are_read(self, tmp_path):
         mesh = read_mesh(save(tmp_path / "a.ply", ascii_ply().replace("7.0 7.0", "nan inf")))
         assert np.isnan(vertices_of(mesh)[4, 0])
@@ -223,7 +273,9 @@ class TestObj:
         np.testing.assert_array_equal(*places)
 
     def test_missing_material_library(self, tmp_path, capfd):
-        mesh = read_mesh(save(tmp_path / "a.obj", QUAD_OBJ))
+        path = save(tmp_path / "a.obj", QUAD_OBJ)
+        mesh, notes = read_mesh_and_notes(path)
+        assert notes == [f"{path} names a.mtl, which cannot be read: what it colours is left plain"]
         assert len(mesh.triangles) == 4
         assert len(mesh.textures) == 0
         assert mesh.has_triangle_uvs()
@@ -234,12 +286,31 @@ class TestObj:
         save(tmp_path / "a.mtl", QUAD_MTL)
         if content:
             save(tmp_path / "wood.png", content)
-        mesh = read_mesh(save(tmp_path / "a.obj", QUAD_OBJ))
+        mesh, notes = read_mesh_and_notes(save(tmp_path / "a.obj", QUAD_OBJ))
+        assert len(notes) == 1
+        assert "names textures\\wood.png, which cannot be read" in notes[0]
         assert [np.asarray(texture).tolist() for texture in mesh.textures] == [
             [[[0, 0, 0]]],
             [[[255, 0, 51]]],
         ]
         assert capfd.readouterr() == ("", "")
+
+    @pytest.mark.parametrize(
+        ("line", "there", "missing"),
+        [
+            ("mtllib a b.mtl", ["a b.mtl"], []),
+            ("mtllib a.mtl b.mtl", ["a.mtl", "b.mtl"], []),
+            ("mtllib a.mtl b.mtl", ["a.mtl"], ["b.mtl"]),
+            ("mtllib", [], []),
+        ],
+    )
+    def test_names_of_material_libraries(self, tmp_path, line, there, missing):
+        for name in there:
+            save(tmp_path / name, QUAD_MTL.replace("map_Kd", "#"))
+        path = save(tmp_path / "c.obj", QUAD_OBJ.replace("mtllib a.mtl", line))
+        mesh, notes = read_mesh_and_notes(path)
+        assert [note.split(" names ")[1].split(",")[0] for note in notes] == missing
+        assert len(mesh.textures) == (2 if there else 0)
 
     def test_one_color_becomes_the_vertex_color(self, tmp_path):
         save(tmp_path / "a.mtl", QUAD_MTL)
@@ -441,6 +512,17 @@ class TestGlb:
         ):
             read_mesh(save(tmp_path / "a.gltf", files["model.gltf"]))
 
+    def test_gltf_with_a_missing_picture_is_noted(self, tmp_path):
+        files = textured_box("red")[0].export(file_type="gltf")
+        tree = json.loads(files["model.gltf"])
+        tree["images"] = [{"uri": "gone.png"}]
+        for name, content in files.items():
+            save(tmp_path / name, content)
+        path = save(tmp_path / "a.gltf", json.dumps(tree))
+        mesh, notes = read_mesh_and_notes(path)
+        assert notes == [f"{path} names gone.png, which cannot be read: what it colours is left plain"]
+        assert len(mesh.triangles) == 12
+
     @pytest.mark.parametrize(
         ("change", "reason"),
         [
@@ -468,6 +550,24 @@ class TestGlb:
         with pytest.raises(FileError, match="its texture coordinates are whole numbers"):
             read_mesh(save(tmp_path / "a.glb", data))
 
+    def test_colors_of_one_number(self, tmp_path):
+        box = trimesh.creation.box()
+        material = PBRMaterial()
+        box.visual = TextureVisuals(uv=np.zeros((8, 2)), material=material)
+        box.visual.vertex_attributes["color"] = np.full((8, 4), 90, np.uint8)
+        tree, rest = glb_tree(box.export(file_type="glb"))
+        tree["accessors"][tree["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"]]["type"] = "SCALAR"
+        with pytest.raises(FileError, match="it is damaged"):
+            read_mesh(save(tmp_path / "a.glb", glb_of(tree, rest)))
+
+    def test_uvs_of_three_numbers(self, tmp_path):
+        data = textured_box("red")[0].export(file_type="glb")
+        tree, rest = glb_tree(data)
+        attributes = tree["meshes"][0]["primitives"][0]["attributes"]
+        attributes["TEXCOORD_0"] = attributes["POSITION"]
+        with pytest.raises(FileError, match="it is damaged"):
+            read_mesh(save(tmp_path / "a.glb", glb_of(tree, rest)))
+
     def test_index_out_of_range(self, tmp_path):
         data = trimesh.creation.box().export(file_type="glb")
         start = 28 + struct.unpack_from("<I", data, 12)[0]
@@ -476,6 +576,84 @@ class TestGlb:
             FileError, match=r"a\.glb cannot be read: it has a face with a vertex that does not"
         ):
             read_mesh(save(tmp_path / "a.glb", broken))
+
+
+def glb_tree(data):
+    """Return the header of a GLB file and what follows it."""
+    size = struct.unpack_from("<I", data, 12)[0]
+    return json.loads(data[20 : 20 + size]), data[20 + size :]
+
+
+def glb_of(tree, rest):
+    text = json.dumps(tree).encode()
+    text += b" " * (-len(text) % 4)
+    return struct.pack("<4sIII4s", b"glTF", 2, 20 + len(text) + len(rest), len(text), b"JSON") + text + rest
+
+
+class TestBombs:
+    """Small files that would use up the memory, or never end."""
+
+    @pytest.fixture
+    def box(self):
+        return glb_tree(trimesh.Scene(trimesh.creation.box()).export(file_type="glb"))
+
+    @pytest.mark.parametrize("children", [lambda first: [0], lambda first: [first, first]])
+    def test_nodes_in_a_circle_or_doubled_forty_times(self, tmp_path, box, children):
+        tree, rest = box
+        first = len(tree["nodes"])
+        tree["nodes"] += [{"children": children(first + i + 1)} for i in range(40)]
+        tree["nodes"] += [{"mesh": 0}]
+        tree["nodes"][0].setdefault("children", []).append(first)
+        assert len(read_mesh(save(tmp_path / "a.glb", glb_of(tree, rest))).triangles) <= 24
+
+    def test_one_mesh_shown_very_often(self, tmp_path, box, monkeypatch):
+        tree, rest = box
+        first = len(tree["nodes"])
+        tree["nodes"] += [{"mesh": 0} for _ in range(999)]
+        tree["scenes"][0]["nodes"] += range(first, first + 999)
+        path = save(tmp_path / "a.glb", glb_of(tree, rest))
+        assert len(read_mesh(path).triangles) == 12_000
+        monkeypatch.setattr("o3d_relief.scene.gltf.memory_for", lambda triangles: triangles < 12_000)
+        with pytest.raises(
+            FileError, match=r"its nodes show 12,000 triangles, more than there is memory for"
+        ):
+            read_mesh(path)
+
+    @pytest.mark.parametrize("accessor", [0, 1])
+    def test_geometry_without_data(self, tmp_path, box, accessor):
+        tree, rest = box
+        del tree["accessors"][accessor]["bufferView"]
+        tree["accessors"][accessor]["count"] = 2**31
+        with pytest.raises(FileError, match="it has geometry without data, save it without compression"):
+            read_mesh(save(tmp_path / "a.glb", glb_of(tree, rest)))
+
+    @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="devices and pipes of POSIX")
+    def test_devices_and_pipes(self, tmp_path):
+        os.mkfifo(tmp_path / "a.ply")
+        with pytest.raises(FileError, match=r"a\.ply cannot be read: it is a device or a pipe\."):
+            read_mesh(tmp_path / "a.ply")
+        path = save(tmp_path / "a.obj", QUAD_OBJ.replace("a.mtl", "/dev/zero"))
+        assert "names /dev/zero, which cannot be read" in read_mesh_and_notes(path)[1][0]
+        files = trimesh.Scene(trimesh.creation.box()).export(file_type="gltf")
+        tree = json.loads(files["model.gltf"])
+        tree["buffers"][0]["uri"] = "/dev/zero"
+        with pytest.raises(FileError, match="damaged, or a file that it names is missing"):
+            read_mesh(save(tmp_path / "a.gltf", json.dumps(tree)))
+
+    def test_a_texture_too_large_for_the_memory(self, tmp_path, monkeypatch):
+        save(tmp_path / "a.mtl", QUAD_MTL)
+        save(tmp_path / "wood.png", bytes(10_000))
+        path = save(tmp_path / "a.obj", QUAD_OBJ)
+        monkeypatch.setattr("o3d_relief.limits.available_memory", lambda: 9_000)
+        assert "wood.png, which cannot be read" in read_mesh_and_notes(path)[1][0]
+
+    def test_names_in_a_gltf_file_may_be_escaped(self, tmp_path):
+        files = trimesh.Scene(trimesh.creation.box()).export(file_type="gltf")
+        tree = json.loads(files.pop("model.gltf"))
+        for buffer in tree["buffers"]:
+            save(tmp_path / f"a {buffer['uri']}", files[buffer["uri"]])
+            buffer["uri"] = f"a%20{buffer['uri']}"
+        assert len(read_mesh(save(tmp_path / "a.gltf", json.dumps(tree))).triangles) == 12
 
 
 class TestRefusals:

@@ -1,7 +1,8 @@
 import numpy as np
+import pytest
 
-from o3d_relief.scene.weld import weld
-from shapes import bust, exploded
+from o3d_relief.scene.weld import SEAM, same_places, weld
+from shapes import bust, exploded, grid, joined, moved
 
 
 def test_exploded_mesh_is_joined_again():
@@ -37,3 +38,43 @@ def test_input_survives():
     vertices, faces = bust(12)
     vertices.flags.writeable = faces.flags.writeable = False
     weld(vertices, faces)
+
+
+def test_every_input_face_names_its_welded_face():
+    vertices, faces = bust(8)
+    chosen = np.array([0, 5, 0, 7])
+    both = np.concatenate([faces, faces[chosen][:, ::-1], [[3, 3, 4]]])
+    whole = weld(vertices, both)
+    assert np.array_equal(whole.face_index, np.concatenate([np.arange(len(faces)), chosen, [-1]]))
+
+
+@pytest.mark.parametrize("shift", [0.3, 0.9])
+def test_sides_of_a_seam_are_joined_up_to_the_tolerance(shift):
+    left, right = grid(5, size=4.0), moved(grid(5, size=4.0), (4.0 + shift * SEAM, 0, 0))
+    vertices, faces = joined(left, right)
+    whole = weld(vertices, faces)
+    assert whole.merged_vertices == 5
+    assert len(whole.vertices) == 45
+    assert np.abs(whole.vertices[whole.index] - vertices).max() <= SEAM
+    # The smaller coordinates stand for both, whichever half comes first.
+    again = weld(*joined(right, left))
+    assert sorted(again.vertices.tolist()) == sorted(whole.vertices.tolist())
+
+
+def test_wider_gaps_and_inner_vertices_stay():
+    vertices, faces = joined(grid(5, size=4.0), moved(grid(5, size=4.0), (4.0 + 1.1 * SEAM, 0, 0)))
+    assert weld(vertices, faces).merged_vertices == 0
+    # Only the rims of layers that nearly touch are one, not what lies inside them.
+    vertices, faces = joined(grid(5, size=4.0), moved(grid(5, size=4.0), (0, 0, 0.5 * SEAM)))
+    assert weld(vertices, faces).merged_vertices == 16
+
+
+def test_fine_closed_surfaces_are_not_touched():
+    vertices, faces = bust(12)
+    tiny = vertices * 1e-6
+    assert np.array_equal(same_places(tiny, faces), same_places(vertices, faces))
+
+
+def test_nothing():
+    assert len(weld(np.zeros((3, 3)), np.array([[0, 1, 2]])).faces) == 0
+    assert same_places(np.zeros((0, 3)), np.zeros((0, 3), dtype=int)).shape == (0,)

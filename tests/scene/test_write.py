@@ -11,7 +11,7 @@ import trimesh
 
 from o3d_relief.errors import FileError, MeshError
 from o3d_relief.scene.read import read_mesh
-from o3d_relief.scene.write import WRITABLE, check_writable, write_mesh
+from o3d_relief.scene.write import WRITABLE, check_writable, lost_attributes, write_mesh
 
 OFFSET = np.array([1e6, -2e5, 3.0])
 
@@ -208,22 +208,56 @@ class TestRoundTrip:
         assert contents(tmp_path / "one") == contents(tmp_path / "two")
 
 
+class TestLosses:
+    @pytest.mark.parametrize(
+        ("name", "kind", "lost"),
+        [
+            ("a.ply", "colored", []),
+            ("a.ply", "textured", ["textures"]),
+            ("a.STL", "colored", ["colours"]),
+            ("a.stl", "textured", ["colours", "textures"]),
+            ("a.stl", "plain", []),
+            ("a.obj", "textured", []),
+            ("a.glb", "textured", []),
+        ],
+    )
+    def test_said_in_one_sentence(self, name, kind, lost):
+        what, form = " and no ".join(lost), name[2:].upper()
+        wanted = f"{name} will have no {what}: {form} cannot hold them; OBJ and GLB can"
+        assert lost_attributes(name, MESHES[kind]()) == ([wanted] if lost else [])
+
+    @pytest.mark.parametrize("ending", WRITABLE)
+    def test_what_is_not_finite_is_mended(self, tmp_path, ending):
+        mesh = textured_mesh()
+        np.asarray(mesh.vertex_colors)[3] = np.nan
+        np.asarray(mesh.triangle_uvs)[5] = [np.inf, 1e300]
+        np.asarray(mesh.vertex_normals)[2] = np.nan
+        write_mesh(tmp_path / f"a{ending}", mesh)
+        back = read_mesh(tmp_path / f"a{ending}")
+        for values in (back.vertex_colors, back.triangle_uvs, back.vertex_normals):
+            assert np.isfinite(np.asarray(values)).all()
+        if ending == ".obj":
+            equal(back.vertex_colors[3], [1, 1, 1])
+            equal(back.triangle_uvs[5], [0.5, 0.5])
+            assert not back.has_vertex_normals()
+
+
 class TestPlaces:
     def test_names_beside_an_obj(self, tmp_path):
         write_mesh(tmp_path / "a b.é.OBJ", textured_mesh())
         write_mesh(tmp_path / "c.obj", textured_mesh())
-        names = [
-            "a b.é.OBJ",
-            "a b.é.mtl",
-            "a b.é_0.png",
-            "a b.é_1.png",
-            "c.mtl",
-            "c.obj",
-            "c_0.png",
-            "c_1.png",
-        ]
-        assert sorted(contents(tmp_path)) == names
+        names = sorted(contents(tmp_path))
+        assert names[0] == "a b.é.OBJ"
+        assert names[4:] == ["c.mtl", "c.obj", "c_0.png", "c_1.png"]
+        # Many readers end a name at its first space.
+        assert all(name.startswith("a_b.é_") for name in names[1:4])
+        assert [name[-4:] for name in names[1:4]] == [".mtl", ".png", ".png"]
         assert len(read_mesh(tmp_path / "a b.é.OBJ").textures) == 3
+
+    def test_names_without_spaces_belong_to_one_file_only(self, tmp_path):
+        for name in ("a b.obj", "a_b.obj", "a  b.obj", "a\tb.obj"):
+            write_mesh(tmp_path / name, textured_mesh())
+        assert len(contents(tmp_path)) == 4 * 4
 
     @pytest.mark.parametrize("ending", WRITABLE)
     def test_plain_meshes_make_one_file_with_common_rights(self, tmp_path, ending):

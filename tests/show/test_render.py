@@ -552,3 +552,20 @@ def test_the_sky_is_evenly_covered():
     assert np.linalg.norm(points.mean(axis=0)) < 0.01
     assert reach.min() >= 0.0
     assert reach.max() < 0.5
+
+
+def test_colors_and_coordinates_that_are_no_numbers_do_not_matter():
+    box = o3d.geometry.TriangleMesh.create_box()
+    box.vertex_colors = o3d.utility.Vector3dVector(np.full((8, 3), np.nan))
+    box.triangle_uvs = o3d.utility.Vector2dVector(np.full((36, 2), np.inf))
+    box.textures = [o3d.geometry.Image(np.full((2, 2, 3), 255, np.uint8))]
+    white = o3d.geometry.TriangleMesh.create_box()
+    white.vertex_colors = o3d.utility.Vector3dVector(np.ones((8, 3)))
+    assert np.array_equal(render(box, size=(32, 32)), render(white, size=(32, 32)))
+
+
+@pytest.mark.parametrize("scale", [1e-60, 1e60])
+def test_tiny_and_huge(scale):
+    box = o3d.geometry.TriangleMesh.create_box()
+    picture = render(box, size=(32, 32))
+    assert np.abs(render(box.scale(scale, (0, 0, 0)), size=(32, 32)).astype(int) - picture).max() <= 8

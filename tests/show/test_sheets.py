@@ -55,7 +55,13 @@ def make_stages():
     error = np.zeros(n)
     error[np.argmax(vertices[:, 2])] = 0.8
     records = [
-        SceneStage(vertices=vertices.copy(), faces=faces, welded_index=np.arange(n), unit=1.0),
+        SceneStage(
+            vertices=vertices.copy(),
+            faces=faces,
+            welded_index=np.arange(n),
+            welded_face=np.arange(len(faces)),
+            unit=1.0,
+        ),
         PerspectiveStage(vertices=vertices * [0.8, 0.8, 1.0]),
         VisibilityStage(visible=vertices[:, 2] > 50.0),
         ClustersStage(labels=labels, centers=np.array([[-25.0, -25], [25, -25], [-25, 25], [25, 25]])),
