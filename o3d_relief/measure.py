@@ -67,7 +67,8 @@ class ReliefQuality:
         Pairs of surfaces of the scene one behind the other, on lines through its vertices and on a grid of
         1024 x 1024 lines, and those that have changed places. None where the new heights are not known.
     visible_tested, visible_behind : int or None
-        Visible vertices, and those behind S. None where the new heights are not known.
+        Visible vertices, and those behind S by more than 1e-3 relief units. None
+        where the new heights are not known.
     scene_depth : float
         The scene's visible depth, in its unit.
     depth : float
@@ -192,6 +193,8 @@ class Yardstick:
 
     def _discontinuities(self, relief: Body) -> tuple[int, float]:
         """Count the frontal picture's depth discontinuities, and find the share that the relief keeps."""
+        if self._scene.depth <= _SAME:
+            return 0, float("nan")
         front = (0.0, 0.0)
         before = self._scene.shoot(front, self._reach, self._size)
         camera = self._scene.camera(front, self._reach, self._size)
@@ -201,7 +204,8 @@ class Yardstick:
         after = relief.shoot(front, self._reach, self._size).height.ravel()
         jump = before.height.ravel()[high] - before.height.ravel()[low]
         ratio = relief.depth / self._scene.depth
-        kept = after[high] - after[low] >= _KEPT * ratio * jump  # NaN, where the relief has a hole, is not
+        left = after[high] - after[low]  # NaN, where the relief has a hole, is not kept
+        kept = (left >= _KEPT * ratio * jump) & (left > 0.0)
         return len(high), float(kept.mean())
 
     def _order(

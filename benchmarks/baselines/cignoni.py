@@ -37,7 +37,8 @@ def depth_compression(
 
     Examples
     --------
-    >>> depth_compression(np.array([0.0, 5, 10]), np.ones(3, dtype=bool), 3.0, distance=10.0).tolist()
+    >>> z = depth_compression(np.array([0.0, 5, 10]), np.ones(3, dtype=bool), 3.0, distance=10.0)
+    >>> z.round(12).tolist()
     [0.0, 1.0, 3.0]
     """
     behind_front = z[visible].max() - z

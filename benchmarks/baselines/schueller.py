@@ -19,8 +19,9 @@ __all__ = ["appearance_mimicking", "energy"]
 _HIDDEN = 0.1
 """Weight of hidden vertices against 1 of visible ones."""
 
-_HOLD = 1e-7
-"""Weight that holds loose parts, which the energy leaves free to slide, where linear scaling puts them."""
+_HOLD = 1e-11
+"""Weight, per area, that holds loose parts where linear scaling puts them: the energy lets them slide freely.
+A thousandth of what a wave of 100 relief units has."""
 
 
 def energy(
@@ -111,11 +112,11 @@ def _displacement(
     scaled = np.clip((z - low) * depth / (high - low), 0.0, depth)
     weights = np.where(visible, 1.0, _HIDDEN)
     form = energy(vertices, faces, weights)
-    hold = _HOLD * float(form.diagonal().mean())
+    hold = _HOLD * vertex_areas(vertices, faces)
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     solver = clarabel.DefaultSolver(
-        sp.triu(form + hold * sp.eye_array(n)).tocsc(),
+        sp.triu(form + sp.dia_array((hold[None], [0]), shape=form.shape)).tocsc(),
         -hold * (scaled - z),
         sp.vstack([sp.eye_array(n), -sp.eye_array(n)]).tocsc(),
         np.concatenate([depth - z, z]),
