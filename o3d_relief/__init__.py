@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from o3d_relief.errors import FileError, MeshError, ParameterError, ReliefError, SolverError
     from o3d_relief.linalg.laplacian import cotangent_laplacian
+    from o3d_relief.measure import ReliefQuality, Yardstick, measure_relief
     from o3d_relief.params import ReliefParams, View
     from o3d_relief.pipeline import Relief, make_relief
     from o3d_relief.scene.demo import demo_scene
@@ -24,11 +25,14 @@ __all__ = [
     "Relief",
     "ReliefError",
     "ReliefParams",
+    "ReliefQuality",
     "SolverError",
     "View",
+    "Yardstick",
     "cotangent_laplacian",
     "demo_scene",
     "make_relief",
+    "measure_relief",
     "read_mesh",
     "render",
     "write_mesh",
@@ -45,6 +49,9 @@ _HOME = {
     "Relief": "pipeline",
     "make_relief": "pipeline",
     "cotangent_laplacian": "linalg.laplacian",
+    "ReliefQuality": "measure",
+    "Yardstick": "measure",
+    "measure_relief": "measure",
     "demo_scene": "scene.demo",
     "read_mesh": "scene.read",
     "write_mesh": "scene.write",

@@ -27,7 +27,7 @@ from o3d_relief.show.similarity import similarity as ssim
 
 Surface: TypeAlias = o3d.geometry.TriangleMesh | tuple[NDArray[np.float64], NDArray[np.int64]]
 
-__all__ = ["SEVEN_VIEWS", "ReliefQuality", "Yardstick", "measure"]
+__all__ = ["SEVEN_VIEWS", "ReliefQuality", "Yardstick", "measure_relief"]
 
 SEVEN_VIEWS = ((0.0, 0.0), (-20.0, 0.0), (20.0, 0.0), (-40.0, 0.0), (40.0, 0.0), (0.0, -20.0), (0.0, 20.0))
 """The views of the yardstick, degrees to the right and above: the front, sideways, up and down."""
@@ -240,7 +240,7 @@ class Yardstick:
         return tuple(found)
 
 
-def measure(
+def measure_relief(
     scene: Surface,
     relief: Surface,
     *,
@@ -255,7 +255,7 @@ def measure(
     --------
     >>> import open3d as o3d
     >>> ball = o3d.geometry.TriangleMesh.create_sphere()
-    >>> measure(ball, ball, size=64).silhouette_overlaps[0]
+    >>> measure_relief(ball, ball, size=64).silhouette_overlaps[0]
     1.0
     """
     return Yardstick(scene, views=views, size=size).measure(relief, heights=heights, similarity=similarity)
