@@ -31,9 +31,6 @@ from o3d_relief.measure import Yardstick
 from o3d_relief.scene.convert import arrays_mesh
 from o3d_relief.scene.frame import relief_frame, to_relief_units
 from o3d_relief.scene.weld import weld
-from o3d_relief.show.camera import fit_scale
-from o3d_relief.show.render import render, view_direction
-from o3d_relief.show.sheets import contact_sheet
 from o3d_relief.stages.trim import trim_behind
 from o3d_relief.stages.visibility import visible_vertices
 
@@ -151,30 +148,9 @@ def run(scene: Scene, share: float, method: str, yardstick: Yardstick) -> tuple[
 
 def sheet(scene: Scene, made: dict[str, Made]) -> NDArray[np.uint8]:
     """Draw the scene and its reliefs from three sides, in one light and at one scale."""
-    meshes = {"scene": (scene.vertices, scene.faces)} | {name: one.mesh for name, one in made.items()}
-    whole = np.array([scene.vertices.min(axis=0), scene.vertices.max(axis=0)])
-    views = [view_direction(yaw) for yaw in SHEET_YAWS]
-    # The plate is wider than the box that `fit_scale` fits.
-    scale = 0.84 * min(fit_scale(whole, view, (0, 1, 0), (420, 420)) for view in views)
-    widest = min(fit_scale(whole, view, (0, 1, 0), (1, np.inf)) for view in views)
-    highest = min(fit_scale(whole, view, (0, 1, 0), (np.inf, 1)) for view in views)
-    panel = round(scale / widest / 0.84), round(scale / highest / 0.84)
-    pictures = []
-    for view in views:
-        for name, (vertices, faces) in meshes.items():
-            box = whole if name == "scene" else np.array([vertices.min(axis=0), vertices.max(axis=0)])
-            pictures.append(
-                render(
-                    arrays_mesh(vertices, faces),
-                    direction=view,
-                    size=panel,
-                    bounds=box,
-                    scale=scale,
-                    plate=name != "scene",
-                )
-            )
-    titles = list(meshes) + [""] * (len(pictures) - len(meshes))
-    return contact_sheet(pictures, len(meshes), titles=titles, row_labels=[f"{yaw:g}°" for yaw in SHEET_YAWS])
+    reliefs = {name: arrays_mesh(*one.mesh) for name, one in made.items()}
+    meshes = {"scene": arrays_mesh(scene.vertices, scene.faces)} | reliefs
+    return rel.comparison_sheet(meshes, SHEET_YAWS, plates=reliefs, panel=(420, 420))
 
 
 def angle_table(rows: list[dict[str, Any]]) -> str:

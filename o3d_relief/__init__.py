@@ -14,7 +14,10 @@ if TYPE_CHECKING:
     from o3d_relief.scene.demo import demo_scene
     from o3d_relief.scene.read import read_mesh
     from o3d_relief.scene.write import write_mesh
-    from o3d_relief.show.render import render
+    from o3d_relief.show.camera import view_direction
+    from o3d_relief.show.comparison import comparison_sheet
+    from o3d_relief.show.render import render, save_png
+    from o3d_relief.show.sheets import contact_sheet
 
 __version__ = "0.1.0"
 
@@ -29,12 +32,16 @@ __all__ = [
     "SolverError",
     "View",
     "Yardstick",
+    "comparison_sheet",
+    "contact_sheet",
     "cotangent_laplacian",
     "demo_scene",
     "make_relief",
     "measure_relief",
     "read_mesh",
     "render",
+    "save_png",
+    "view_direction",
     "write_mesh",
 ]
 
@@ -55,7 +62,11 @@ _HOME = {
     "demo_scene": "scene.demo",
     "read_mesh": "scene.read",
     "write_mesh": "scene.write",
+    "comparison_sheet": "show.comparison",
+    "contact_sheet": "show.sheets",
     "render": "show.render",
+    "save_png": "show.render",
+    "view_direction": "show.camera",
 }
 
 
