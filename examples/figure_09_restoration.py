@@ -36,10 +36,11 @@ def main(scene: str | None = None, output: str = "figure_09.png", panel: int = 4
             size=size,
         )
     ]
-    # Close up, where the restoration changes most of what is seen.
-    moved = np.abs(stages["restoration"].z - stages["construction"].z) * stages["visibility"].visible
-    middle = np.asarray(before.vertices)[np.argmax(moved)]
-    box = np.array([middle - 8.0, middle + 8.0])
+    # Close up, where the restoration smooths most of what is seen.
+    laplacian, _ = rel.cotangent_laplacian(places, faces)
+    smoothed = np.abs(laplacian @ (stages["restoration"].z - stages["construction"].z))
+    middle = np.asarray(before.vertices)[np.argmax(smoothed * stages["visibility"].visible)]
+    box = np.array([middle - 6.0, middle + 6.0])
     for title, one in (("constructed", before), ("restored", after)):
         view = rel.view_direction(20, 10)
         pictures.append(rel.render(one, direction=view, bounds=box, title=title, size=size))

@@ -28,7 +28,7 @@ def main(scene: str | None = None, output: str = "figure_12.png", panel: int = 4
     unit = relief.stages["scene"].unit
     places, faces = np.asarray(placed.vertices) / unit, np.asarray(placed.triangles).astype(np.int64)
     shallow = depth / unit / 3  # as bas-reliefs are
-    places, faces = bas_relief(sample(places, faces), shallow).triangulate()
+    places, faces = bas_relief(sample(places, faces, side=panel), shallow).triangulate()
     flat = o3d.geometry.TriangleMesh(
         o3d.utility.Vector3dVector(places * unit), o3d.utility.Vector3iVector(faces.astype(np.int32))
     )

@@ -52,13 +52,14 @@ def still_life() -> Mesh:
     return scene
 
 
-def main(scenes: Sequence[str] = (), output: str = "figure_13.png", panel: int = 420, k: int = 128) -> None:
-    found = [(rel.read_mesh(scene), rel.View()) for scene in scenes]
+def main(scenes: Sequence[str] = (), output: str = "figure_13.png", panel: int = 420) -> None:
+    found = [(rel.read_mesh(scene), 128, rel.View()) for scene in scenes]
     if not found:
-        found = [(rel.demo_scene(), rel.View()), (rel.demo_scene(), rel.View(front="x"))]
-        found += [(coil(), rel.View()), (still_life(), rel.View(front=(0.3, 0.35, 1.0)))]
+        found = [(rel.demo_scene(), 128, rel.View()), (rel.demo_scene(), 128, rel.View(front="x"))]
+        # Smooth bodies show every dent: fewer points.
+        found += [(coil(), 64, rel.View()), (still_life(), 16, rel.View(front=(0.3, 0.35, 1.0)))]
     above, below = [], []
-    for mesh, view in found:
+    for mesh, k, view in found:
         relief = rel.make_relief(mesh, rel.ReliefParams(k=k, alpha=0.8), view=view)
         placed = mesh.transform(np.linalg.inv(relief.to_scene))
         turned = rel.view_direction(30, 10)
