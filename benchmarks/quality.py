@@ -86,17 +86,18 @@ def moved(scene: Scene, heights: NDArray[np.float64]) -> Made:
     return Made(mesh=(cut.vertices, cut.faces), heights=heights)
 
 
-def made_here(scene: Scene, params: rel.ReliefParams) -> Made:
-    """Make a relief with this package."""
+def made_here(scene: Scene, params: rel.ReliefParams, last: str) -> Made:
+    """Make a relief with this package; the stage `last` has the new heights."""
     relief = rel.make_relief(arrays_mesh(scene.vertices, scene.faces), params)
     stages: Any = relief.stages
     mesh = np.asarray(relief.mesh.vertices), np.asarray(relief.mesh.triangles).astype(np.int64)
-    return Made(mesh=mesh, heights=stages["compression"].z * stages["scene"].unit)
+    return Made(mesh=mesh, heights=stages[last].z * stages["scene"].unit)
 
 
 def attenuation(scene: Scene, depth: float) -> Made:
     """Run the paper's method, with what the package adds to it and compressed to the depth."""
-    return made_here(scene, rel.ReliefParams(k=128, depth=depth, in_order=not scene.many_parts))
+    params = rel.ReliefParams(k=128, depth=depth, in_order=not scene.many_parts)
+    return made_here(scene, params, "compression")
 
 
 def mimicking(scene: Scene, depth: float) -> Made | None:

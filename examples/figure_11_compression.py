@@ -16,7 +16,8 @@ def main(scene: str | None = None, output: str = "figure_11.png", panel: int = 4
     mesh.vertex_colors = o3d.utility.Vector3dVector()  # stone: the light alone tells the shape
     method = rel.make_relief(mesh, rel.ReliefParams(k=128, alpha=0.8))
     depth = method.summary()["relief_depth"]
-    plain = rel.make_relief(mesh, rel.ReliefParams(k=1, depth=depth))
+    whole = rel.make_relief(mesh, rel.ReliefParams(k=1)).summary()["relief_depth"]
+    plain = rel.make_relief(mesh, rel.ReliefParams(k=1, alpha=min(1.0, depth / whole)))
     pictures, titles, size = [], [], (panel, panel)
     low, high = method.mesh.get_min_bound(), method.mesh.get_max_bound()
     # Close up at what lies closest to the plane in the middle of the scene, where compression costs most.
