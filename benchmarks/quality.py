@@ -48,6 +48,7 @@ MESHES = (
 SHARES = (0.5, 0.25, 0.1)
 SHEET_SHARE = 0.25
 SHEET_YAWS = (0.0, 20.0, 40.0)
+SHEET_PANEL = (420, 420)
 MANY_PARTS = ("scene_macross_city.glb",)  # thousands of parts: no order, which takes minutes, and no program
 AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}
 
@@ -151,7 +152,7 @@ def sheet(scene: Scene, made: dict[str, Made]) -> NDArray[np.uint8]:
     """Draw the scene and its reliefs from three sides, in one light and at one scale."""
     reliefs = {name: arrays_mesh(*one.mesh) for name, one in made.items()}
     meshes = {"scene": arrays_mesh(scene.vertices, scene.faces)} | reliefs
-    return rel.comparison_sheet(meshes, SHEET_YAWS, plates=reliefs, panel=(420, 420))
+    return rel.comparison_sheet(meshes, SHEET_YAWS, plates=reliefs, panel=SHEET_PANEL)
 
 
 def angle_table(rows: list[dict[str, Any]]) -> str:

@@ -115,6 +115,7 @@ def _displacement(
     hold = _HOLD * vertex_areas(vertices, faces)
     settings = clarabel.DefaultSettings()
     settings.verbose = False
+    settings.direct_solve_method = "qdldl"  # on one thread: equal bytes from equal input
     solver = clarabel.DefaultSolver(
         sp.triu(form + sp.dia_array((hold[None], [0]), shape=form.shape)).tocsc(),
         -hold * (scaled - z),
