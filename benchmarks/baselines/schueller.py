@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import clarabel
 import numpy as np
 import open3d as o3d
 import scipy.sparse as sp
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 import o3d_relief as rel
 from o3d_relief.errors import SolverError
 from o3d_relief.linalg.laplacian import vertex_areas
+from o3d_relief.linalg.quadratic import minimise
 from o3d_relief.scene.convert import arrays_mesh
 from o3d_relief.stages.visibility import visible_vertices
 
@@ -113,18 +113,13 @@ def _displacement(
     weights = np.where(visible, 1.0, _HIDDEN)
     form = energy(vertices, faces, weights)
     hold = _HOLD * vertex_areas(vertices, faces)
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.direct_solve_method = "qdldl"  # on one thread: equal bytes from equal input
-    solver = clarabel.DefaultSolver(
-        sp.triu(form + sp.dia_array((hold[None], [0]), shape=form.shape)).tocsc(),
-        -hold * (scaled - z),
-        sp.vstack([sp.eye_array(n), -sp.eye_array(n)]).tocsc(),
-        np.concatenate([depth - z, z]),
-        [clarabel.NonnegativeConeT(2 * n)],
-        settings,
+    inside = sp.vstack([sp.eye_array(n), -sp.eye_array(n)]).tocsr()
+    displacement = minimise(
+        (form + sp.dia_array((hold[None], [0]), shape=form.shape)).tocsr(),
+        hold * (scaled - z),
+        inside,
+        np.concatenate([-z, z - depth]),
     )
-    solution = solver.solve()
-    if solution.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
-        raise SolverError(f"The quadratic program of {n} vertices was not solved: {solution.status}.")
-    return np.asarray(np.clip(z + np.asarray(solution.x), 0.0, depth) - z)
+    if displacement is None:
+        raise SolverError(f"The quadratic program of {n} vertices was not solved.")
+    return np.asarray(np.clip(z + displacement, 0.0, depth) - z)
