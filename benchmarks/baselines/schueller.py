@@ -19,9 +19,9 @@ __all__ = ["appearance_mimicking", "energy"]
 _HIDDEN = 0.1
 """Weight of hidden vertices against 1 of visible ones."""
 
-_HOLD = 1e-11
+_HOLD = 1e-9
 """Weight, per area, that holds loose parts where linear scaling puts them: the energy lets them slide freely.
-A thousandth of what a wave of 100 relief units has."""
+A wave of 100 relief units costs ten thousand times as much."""
 
 
 def energy(
