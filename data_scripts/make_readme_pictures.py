@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import runpy
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +18,7 @@ from o3d_relief.show.sheets import contact_sheet, stage_picture, view_sheet
 Picture = NDArray[np.uint8]
 
 PANEL = (460, 460)
+EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 
 
 def save(path: Path, picture: Picture) -> None:
@@ -38,6 +41,14 @@ def views(reliefs: dict[str, rel.Relief], yaw: float) -> Picture:
         for name, r in reliefs.items()
     ]
     return contact_sheet(pictures, len(pictures), titles=titles)
+
+
+def figure(path: Path, example: str) -> None:
+    """Let an example draw its figure of the built-in scene."""
+    with tempfile.TemporaryDirectory() as folder:
+        drawn = Path(folder) / "figure.png"
+        runpy.run_path(str(EXAMPLES / f"{example}.py"))["main"](output=str(drawn), panel=360)
+        save(path, np.array(Image.open(drawn).convert("RGB")))
 
 
 def main() -> None:
@@ -68,6 +79,9 @@ def main() -> None:
     points = {"none": None, "g = (0, 0, -300)": (0.0, 0.0, -300.0), "g = (0, 0, -80)": (0.0, 0.0, -80.0)}
     perspectives = {name: make(view=rel.View(vanishing_point=g)) for name, g in points.items()}
     save(folder / "vanishing_point.jpg", views(perspectives, 0))
+    figure(folder / "bas_relief.jpg", "figure_12_bas_relief")
+    figure(folder / "gallery.jpg", "figure_13_gallery")
+    figure(folder / "restoration.jpg", "figure_09_restoration")
 
 
 if __name__ == "__main__":

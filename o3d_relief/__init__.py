@@ -8,12 +8,16 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from o3d_relief.errors import FileError, MeshError, ParameterError, ReliefError, SolverError
     from o3d_relief.linalg.laplacian import cotangent_laplacian
+    from o3d_relief.measure import ReliefQuality, Yardstick, measure_relief
     from o3d_relief.params import ReliefParams, View
     from o3d_relief.pipeline import Relief, make_relief
     from o3d_relief.scene.demo import demo_scene
     from o3d_relief.scene.read import read_mesh
     from o3d_relief.scene.write import write_mesh
-    from o3d_relief.show.render import render
+    from o3d_relief.show.camera import view_direction
+    from o3d_relief.show.comparison import comparison_sheet
+    from o3d_relief.show.render import render, save_png
+    from o3d_relief.show.sheets import contact_sheet
 
 __version__ = "0.1.0"
 
@@ -24,13 +28,20 @@ __all__ = [
     "Relief",
     "ReliefError",
     "ReliefParams",
+    "ReliefQuality",
     "SolverError",
     "View",
+    "Yardstick",
+    "comparison_sheet",
+    "contact_sheet",
     "cotangent_laplacian",
     "demo_scene",
     "make_relief",
+    "measure_relief",
     "read_mesh",
     "render",
+    "save_png",
+    "view_direction",
     "write_mesh",
 ]
 
@@ -45,10 +56,17 @@ _HOME = {
     "Relief": "pipeline",
     "make_relief": "pipeline",
     "cotangent_laplacian": "linalg.laplacian",
+    "ReliefQuality": "measure",
+    "Yardstick": "measure",
+    "measure_relief": "measure",
     "demo_scene": "scene.demo",
     "read_mesh": "scene.read",
     "write_mesh": "scene.write",
+    "comparison_sheet": "show.comparison",
+    "contact_sheet": "show.sheets",
     "render": "show.render",
+    "save_png": "show.render",
+    "view_direction": "show.camera",
 }
 
 

@@ -4,6 +4,7 @@ from pathlib import Path
 import numpy as np
 import open3d as o3d
 import pytest
+from PIL import Image
 
 from o3d_relief import read_mesh
 from shapes import bust, to_mesh
@@ -25,9 +26,48 @@ def _load(name):
     return module
 
 
+FIGURES = [
+    "figure_05_perspective",
+    "figure_06_curve",
+    "figure_07_attenuation",
+    "figure_08_growing_k",
+    "figure_09_restoration",
+    "figure_10_local_beta",
+    "figure_11_compression",
+    "figure_12_bas_relief",
+    "figure_13_gallery",
+]
+
+
 def test_every_example_has_a_test():
-    tested = {"first_relief", "single_stages"}
-    assert {path.stem for path in EXAMPLES.glob("*.py")} == tested
+    assert {path.stem for path in EXAMPLES.glob("*.py")} == {"first_relief", "single_stages", *FIGURES}
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_figures(tmp_path, scene, capsys, name):
+    output = tmp_path / "figure.png"
+    _load(name).main([scene] if name == "figure_13_gallery" else scene, str(output), panel=72)
+    with Image.open(output) as picture:
+        pixels = np.asarray(picture.convert("L"))
+    assert min(pixels.shape) >= 64
+    assert np.ptp(pixels) > 100  # something is drawn
+    assert capsys.readouterr().out
+
+
+def test_gallery_scenes_are_sound():
+    gallery = _load("figure_13_gallery")
+    knot = gallery.coil(steps=120, around=8)
+    assert knot.is_watertight()
+    assert knot.get_volume() > 0.0  # faces turn outwards
+    assert len(np.unique(gallery.still_life().cluster_connected_triangles()[0])) == 5
+
+
+def test_strip_of_the_curve_does_not_cross_itself():
+    strip = _load("figure_06_curve").folded_strip(101)
+    x, _, z = np.asarray(strip.vertices)[:101].T
+    assert (np.diff(x) < 0.0).any()  # it overhangs
+    assert not strip.is_self_intersecting()
+    assert z.min() >= 0.0
 
 
 def test_first_relief(tmp_path, scene, capsys):

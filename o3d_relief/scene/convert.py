@@ -1,15 +1,15 @@
-"""Open3D meshes to arrays: the border at which meshes are checked once."""
+"""Open3D meshes to arrays and back: the border at which meshes are checked once."""
 
 from __future__ import annotations
 
 import numpy as np
 import open3d as o3d
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from o3d_relief.errors import MeshError
 from o3d_relief.limits import check_triangles
 
-__all__ = ["mesh_arrays"]
+__all__ = ["arrays_mesh", "mesh_arrays"]
 
 _LARGEST = 1e50
 """Squared areas of larger scenes, and of scenes smaller than the inverse, leave the range of float64."""
@@ -83,3 +83,25 @@ def _check_size(used: NDArray[np.float64]) -> None:
             f"The mesh is only {extent:.0e} large, and {1.0 / _LARGEST:.0e} is the least that can be "
             "computed with: scale it up first."
         )
+
+
+def arrays_mesh(vertices: ArrayLike, faces: ArrayLike) -> o3d.geometry.TriangleMesh:
+    """Copy vertices and faces into an Open3D mesh.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float
+    faces : (m, 3) int
+
+    Raises
+    ------
+    MeshError
+        Arrays of other shapes.
+    """
+    places, corners = np.asarray(vertices, dtype=np.float64), np.asarray(faces)
+    for name, array in (("vertices", places), ("faces", corners)):
+        if array.ndim != 2 or array.shape[1] != 3:
+            raise MeshError(f"{name} must be of the shape (count, 3). Got {array.shape} instead.")
+    return o3d.geometry.TriangleMesh(
+        o3d.utility.Vector3dVector(places), o3d.utility.Vector3iVector(corners.astype(np.int32))
+    )

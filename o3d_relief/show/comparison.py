@@ -1,0 +1,79 @@
+"""Several meshes side by side, from several sides, at one scale and in one light."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o3d_relief.errors import ParameterError
+from o3d_relief.show.camera import fit_scale, view_direction
+from o3d_relief.show.render import plate_bounds, render
+from o3d_relief.show.sheets import contact_sheet
+
+if TYPE_CHECKING:
+    import open3d as o3d
+
+__all__ = ["comparison_sheet"]
+
+
+def comparison_sheet(
+    meshes: Mapping[str, o3d.geometry.TriangleMesh],
+    yaws: Sequence[float] = (0.0,),
+    *,
+    plates: Collection[str] = (),
+    panel: tuple[int, int] = (460, 460),
+) -> NDArray[np.uint8]:
+    """Show meshes side by side, a column for each and a row for each side.
+
+    Parameters
+    ----------
+    meshes : mapping of str to open3d.geometry.TriangleMesh
+        By their titles; in the relief frame and in one unit. Each lies in the middle of its panels.
+    yaws : sequence of float
+        Degrees to the right of the front.
+    plates : collection of str
+        Titles of the meshes that get a plate at z = 0.
+    panel : (width, height)
+        Of each picture at most, in pixels; less where the views are narrow or flat.
+
+    Returns
+    -------
+    (height, width, 3) uint8
+
+    Raises
+    ------
+    ParameterError
+        No mesh, no view, or a plate for a mesh that is not there.
+    MeshError
+        A mesh without a triangle to draw.
+    """
+    if not meshes or not yaws:
+        raise ParameterError("A comparison needs a mesh and a view.")
+    unknown = sorted(set(plates) - set(meshes))
+    if unknown:
+        raise ParameterError(f"plates must be among {', '.join(meshes)}. Got {unknown[0]!r} instead.")
+    boxes = {name: np.array([mesh.get_min_bound(), mesh.get_max_bound()]) for name, mesh in meshes.items()}
+    views = [view_direction(yaw) for yaw in yaws]
+    framed = [_with_plate(box) if name in plates else box for name, box in boxes.items()]
+    pairs = [(box, view) for box in framed for view in views]
+    scale = min(fit_scale(box, view, (0, 1, 0), panel) for box, view in pairs)
+    # Pictures no wider and no higher than the widest and the highest view need.
+    widest = min(fit_scale(box, view, (0, 1, 0), (1.0, np.inf)) for box, view in pairs)
+    highest = min(fit_scale(box, view, (0, 1, 0), (np.inf, 1.0)) for box, view in pairs)
+    size = max(1, round(scale / widest)), max(1, round(scale / highest))
+    pictures = [
+        render(mesh, direction=view, size=size, plate=name in plates, bounds=boxes[name], scale=scale)
+        for view in views
+        for name, mesh in meshes.items()
+    ]
+    titles = list(meshes) + [""] * (len(pictures) - len(meshes))
+    labels = [f"{yaw:g}°" for yaw in yaws] if len(yaws) > 1 else ()
+    return contact_sheet(pictures, len(meshes), titles=titles, row_labels=labels)
+
+
+def _with_plate(box: NDArray[np.float64]) -> NDArray[np.float64]:
+    slab = plate_bounds(box)
+    return np.array([np.minimum(box[0], slab[0]), np.maximum(box[1], slab[1])])

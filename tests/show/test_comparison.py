@@ -1,0 +1,46 @@
+import numpy as np
+import pytest
+
+from o3d_relief.errors import ParameterError
+from o3d_relief.show.comparison import comparison_sheet
+from shapes import grid, sphere, to_mesh
+
+
+@pytest.fixture(scope="module")
+def meshes():
+    return {"ball": to_mesh(sphere(8)), "sheet": to_mesh(grid(3))}
+
+
+def test_a_column_for_each_mesh_and_a_row_for_each_side(meshes):
+    one = comparison_sheet(meshes, panel=(50, 50))
+    two = comparison_sheet(meshes, (0.0, 30.0), panel=(50, 50))
+    assert one.dtype == np.uint8
+    assert two.shape[0] > one.shape[0] + 25
+    assert two.shape[1] > one.shape[1]  # the labels of the rows
+
+
+def test_scale_is_common(meshes):
+    small = {"ball": meshes["ball"], "small": to_mesh(sphere(8, radius=25.0))}
+    sheet = comparison_sheet(small, panel=(100, 100)).astype(int)
+    body = sheet[-100:]  # without the titles
+    paper = body[0, 0]
+    rows = [
+        (np.abs(half - paper).sum(axis=2) > 30).any(axis=1).sum() for half in (body[:, :100], body[:, -100:])
+    ]
+    assert rows[0] == pytest.approx(2 * rows[1], abs=3)
+
+
+def test_panels_are_no_wider_than_the_views(meshes):
+    flat = to_mesh((grid(3)[0] * np.array([1.0, 0.2, 1.0]), grid(3)[1]))
+    assert comparison_sheet({"a": flat}, panel=(100, 100)).shape[0] < 60
+    plated = comparison_sheet({"a": flat}, plates=["a"], panel=(100, 100))
+    assert plated.shape[0] > comparison_sheet({"a": flat}, panel=(100, 100)).shape[0]
+
+
+def test_errors(meshes):
+    with pytest.raises(ParameterError, match="needs a mesh and a view"):
+        comparison_sheet({})
+    with pytest.raises(ParameterError, match="needs a mesh and a view"):
+        comparison_sheet(meshes, ())
+    with pytest.raises(ParameterError, match=r"among ball, sheet\. Got 'cube' instead"):
+        comparison_sheet(meshes, plates=["cube"])
