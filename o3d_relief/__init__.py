@@ -10,8 +10,10 @@ if TYPE_CHECKING:
     from o3d_relief.linalg.laplacian import cotangent_laplacian
     from o3d_relief.params import ReliefParams, View
     from o3d_relief.pipeline import Relief, make_relief
+    from o3d_relief.scan_params import ScanParams
     from o3d_relief.scene.demo import demo_scene
-    from o3d_relief.scene.read import read_mesh
+    from o3d_relief.scene.read import read_mesh, read_points
+    from o3d_relief.scene.scan import Scan, mesh_from_points, scan_points
     from o3d_relief.scene.write import write_mesh
     from o3d_relief.show.render import render
 
@@ -24,13 +26,18 @@ __all__ = [
     "Relief",
     "ReliefError",
     "ReliefParams",
+    "Scan",
+    "ScanParams",
     "SolverError",
     "View",
     "cotangent_laplacian",
     "demo_scene",
     "make_relief",
+    "mesh_from_points",
     "read_mesh",
+    "read_points",
     "render",
+    "scan_points",
     "write_mesh",
 ]
 
@@ -46,7 +53,12 @@ _HOME = {
     "make_relief": "pipeline",
     "cotangent_laplacian": "linalg.laplacian",
     "demo_scene": "scene.demo",
+    "ScanParams": "scan_params",
+    "Scan": "scene.scan",
+    "mesh_from_points": "scene.scan",
+    "scan_points": "scene.scan",
     "read_mesh": "scene.read",
+    "read_points": "scene.read",
     "write_mesh": "scene.write",
     "render": "show.render",
 }
