@@ -63,7 +63,7 @@ class ScanParams:
     max_points: int = 1_000_000
     outliers: float | None = 4.0
     max_hole: float = 10.0
-    min_part: float = 0.02
+    min_part: float = 0.01
     threads: int = 1
     seed: int = 0
 

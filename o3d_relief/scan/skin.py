@@ -49,14 +49,17 @@ def support(
 
     Examples
     --------
-    >>> support(np.array([[0, 1, 2], [1, 2, 3]]), np.array([0, 0, 0, 9.0]), np.full(4, 8.0), 10.0)[3]
-    -1.0
+    >>> strip = np.arange(38)[:, None] + [0, 1, 2]
+    >>> support(strip, np.repeat([0.0, 9.0], 20), np.full(40, 8.0), 10.0)[[0, 39]].round(6).tolist()
+    [1.0, -1.0]
     """
     inside = np.clip(_SUPPORTED - distance, -1.0, 1.0)
     near = inside >= 0.0
+    depth_of_hole = np.where(near, 0.0, distance)
     if near.any():
-        sparse = density < np.percentile(density[near], 1.0) - _SPARSE
-        inside[near & sparse] = -1.0
+        sparse = near & (density < np.percentile(density[near], 1.0) - _SPARSE)
+        inside[sparse] = -1.0
+        depth_of_hole[sparse] = np.inf  # a bubble around a stray point is no hole
         near &= ~sparse
     edges = _edges(faces)
     far_edges = edges[~near[edges].any(axis=1)]
@@ -64,7 +67,7 @@ def support(
     graph = sp.coo_array((ones, tuple(far_edges.T)), shape=(len(distance), len(distance)))
     count, patch = connected_components(graph, directed=False)
     widest = np.zeros(count)
-    np.maximum.at(widest, patch, np.where(near, 0.0, distance))
+    np.maximum.at(widest, patch, depth_of_hole)
     inside[~near & (widest[patch] <= max_hole / 2.0)] = 1.0
     return _smoothed(inside, edges)
 

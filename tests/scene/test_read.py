@@ -532,7 +532,9 @@ class TestRefusals:
         ],
     )
     def test_point_cloud(self, tmp_path, name, content):
-        with pytest.raises(MeshError, match="has no triangles, only 5 points: a relief needs a mesh"):
+        with pytest.raises(
+            MeshError, match="has no triangles, only 5 points: read this cloud with read_points"
+        ):
             read_mesh(save(tmp_path / name, content))
 
     @pytest.mark.parametrize("content", [bytes(84), b"solid nothing\nendsolid nothing\n"])
