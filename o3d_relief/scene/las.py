@@ -41,6 +41,7 @@ def decode_las(data: bytes) -> CloudArrays:
         raise FileError(
             "LAS and LAZ files need the packages laspy and lazrs (pip install 'o3d-relief[las]')"
         ) from None
+    _check_header(data)
     try:
         with laspy.open(BytesIO(data)) as reader:
             if reader.header.point_count > _MOST_PER_BYTE * len(data):
@@ -58,6 +59,16 @@ def decode_las(data: bytes) -> CloudArrays:
     if len(points) < las.header.point_count - int((~kept).sum()):
         raise FileError("it ends too early, part of it is missing")
     return CloudArrays(points=points, colors=_read_colors(las, kept))
+
+
+def _check_header(data: bytes) -> None:
+    """Refuse counts at which laspy would go on for minutes: of records that have 54 or 60 bytes at least."""
+    if data[:4] != b"LASF" or len(data) < 227:
+        raise FileError("it is no LAS or LAZ file, or it ends too early")
+    records = int.from_bytes(data[100:104], "little")
+    extended = int.from_bytes(data[243:247], "little") if data[25] >= 4 else 0
+    if 54 * records > len(data) or 60 * extended > len(data):
+        raise FileError("it says that it has more records than so short a file can hold")
 
 
 def _read_colors(las: object, kept: NDArray[np.bool_]) -> NDArray[np.float64] | None:
