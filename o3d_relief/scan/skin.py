@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 __all__ = ["carry_colors", "keep_parts", "support", "used_only"]
 
-_SUPPORTED = 1.0
+_SUPPORTED = 0.8
 """Surface this near to a point, in local spacings, is measured; the rest is invented."""
 
 _SPARSE = 2.0
@@ -62,12 +62,13 @@ def support(
         depth_of_hole[sparse] = np.inf  # a bubble around a stray point is no hole
         near &= ~sparse
     edges = _edges(faces)
+    depth_of_hole[_boundary(edges)] = np.inf  # where the octree ends, the skin would have gone on
     far_edges = edges[~near[edges].any(axis=1)]
     ones = np.ones(len(far_edges), dtype=np.int8)
     graph = sp.coo_array((ones, tuple(far_edges.T)), shape=(len(distance), len(distance)))
     count, patch = connected_components(graph, directed=False)
     widest = np.zeros(count)
-    np.maximum.at(widest, patch, depth_of_hole)
+    np.maximum.at(widest, patch, np.where(near, 0.0, depth_of_hole))
     inside[~near & (widest[patch] <= max_hole / 2.0)] = 1.0
     return _smoothed(inside, edges)
 
@@ -75,6 +76,12 @@ def support(
 def _edges(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return the edges (3f, 2) of faces, inner ones twice."""
     return np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+
+
+def _boundary(edges: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the vertices of the edges (e, 2) that only one face has."""
+    each, count = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
+    return np.unique(each[count == 1])
 
 
 def _smoothed(values: NDArray[np.float64], edges: NDArray[np.int64]) -> NDArray[np.float64]:

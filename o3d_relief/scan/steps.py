@@ -56,8 +56,11 @@ _AGREEING = 0.75
 _ALIKE = 0.9
 """Share of a cloud's normals that must point to the same side as their neighbours'."""
 
-_DECIDED = 0.6
+_DECIDED = 0.8
 """Share of the votes that shows that a cloud's normals point outwards as a whole, or inwards."""
+
+_LARGEST = 1e100
+"""A wider cloud has numbers that are no coordinates; their squares would overflow."""
 
 _WIDEST = 4.0
 """The spacing around a single point counts up to so many times the median."""
@@ -99,7 +102,10 @@ def points_step(cloud: CloudArrays, params: ScanParams, view: View) -> tuple[Poi
     _check_enough(len(single), f"{len(finite)} points of the cloud, {len(single)} of them apart")
     index, points = finite[single], points[single]
     centre = points.min(axis=0) / 2 + points.max(axis=0) / 2
-    size = float(np.abs(points - centre).max()) * 2.0
+    half = float(np.abs(points - centre).max())
+    if not half < _LARGEST:
+        raise MeshError(f"The points spread over {half:.3g}, which is too far for a scan.")
+    size = 2.0 * half
     work = (points - centre) / size
     kept = _thinned(work, params.max_points)
     index, points, work = index[kept], points[kept], work[kept]
@@ -250,7 +256,9 @@ def surface_step(work: Work, oriented: OrientationStage, params: ScanParams) -> 
 def skin_step(work: Work, oriented: OrientationStage, surface: SurfaceStage, params: ScanParams) -> SkinStage:
     """Cut away what of the surface no points support."""
     used = oriented.normals.any(axis=1)
-    local = np.minimum(work.local_spacing, _WIDEST * float(np.median(work.local_spacing[used])))[used]
+    # Along the border of a scan circles are half empty; the neighbours further in know better.
+    around = np.percentile(work.local_spacing[work.neighbours.index[used]], 25.0, axis=1)
+    local = np.minimum(around, _WIDEST * float(np.median(work.local_spacing[used])))
     vertices = (surface.vertices - work.centre) / work.size
     distance, nearest = cKDTree(work.points[used]).query(vertices, workers=-1)
     distance = distance / local[nearest]

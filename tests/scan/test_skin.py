@@ -40,7 +40,7 @@ def test_a_bubble_around_a_stray_point_goes():
     vertices, faces = joined(grid(61, size=60.0), moved(grid(5, size=4.0), (0, 0, 30)))
     density = np.append(DENSE, np.full(25, 4.0))
     inside = support(faces, np.zeros(len(vertices)), density, 10.0)
-    assert (inside[:3721] == 1.0).all()
+    assert (inside[:3721] > 0.5).all()
     assert (inside[3721:] == -1.0).all()
 
 
