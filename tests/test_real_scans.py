@@ -46,7 +46,7 @@ def on_surface(mesh):
 
 def away(mesh, points):
     """Return the distances of points (n, 3) from a mesh."""
-    centre, size = mesh.get_center(), float(mesh.get_max_extent())
+    centre, size = mesh.get_center(), float(np.ptp(np.asarray(mesh.vertices), axis=0).max())
     small = o3d.geometry.TriangleMesh(mesh).translate(-centre).scale(1 / size, center=(0, 0, 0))
     scene = o3d.t.geometry.RaycastingScene()
     scene.add_triangles(o3d.t.geometry.TriangleMesh.from_legacy(small))

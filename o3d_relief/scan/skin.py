@@ -62,7 +62,9 @@ def support(
         depth_of_hole[sparse] = np.inf  # a bubble around a stray point is no hole
         near &= ~sparse
     edges = _edges(faces)
-    depth_of_hole[_boundary(edges)] = np.inf  # where the octree ends, the skin would have gone on
+    depth_of_hole[_boundary(edges, len(distance))] = (
+        np.inf
+    )  # where the octree ends, the skin would have gone on
     far_edges = edges[~near[edges].any(axis=1)]
     ones = np.ones(len(far_edges), dtype=np.int8)
     graph = sp.coo_array((ones, tuple(far_edges.T)), shape=(len(distance), len(distance)))
@@ -78,10 +80,11 @@ def _edges(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
 
 
-def _boundary(edges: NDArray[np.int64]) -> NDArray[np.int64]:
+def _boundary(edges: NDArray[np.int64], vertex_count: int) -> NDArray[np.int64]:
     """Return the vertices of the edges (e, 2) that only one face has."""
-    each, count = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
-    return np.unique(each[count == 1])
+    key, count = np.unique(edges.min(axis=1) * vertex_count + edges.max(axis=1), return_counts=True)
+    single = key[count == 1]
+    return np.unique(np.concatenate([single // vertex_count, single % vertex_count]))
 
 
 def _smoothed(values: NDArray[np.float64], edges: NDArray[np.int64]) -> NDArray[np.float64]:
