@@ -51,7 +51,7 @@ def support(
     --------
     >>> strip = np.arange(38)[:, None] + [0, 1, 2]
     >>> support(strip, np.repeat([0.0, 9.0], 20), np.full(40, 8.0), 10.0)[[0, 39]].round(6).tolist()
-    [1.0, -1.0]
+    [0.8, -1.0]
     """
     inside = np.clip(_SUPPORTED - distance, -1.0, 1.0)
     near = inside >= 0.0
