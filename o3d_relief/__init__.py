@@ -11,8 +11,10 @@ if TYPE_CHECKING:
     from o3d_relief.measure import ReliefQuality, Yardstick, measure_relief
     from o3d_relief.params import ReliefParams, View
     from o3d_relief.pipeline import Relief, make_relief
+    from o3d_relief.scan_params import ScanParams
     from o3d_relief.scene.demo import demo_scene
-    from o3d_relief.scene.read import read_mesh
+    from o3d_relief.scene.read import read_mesh, read_points
+    from o3d_relief.scene.scan import Scan, mesh_from_points, scan_points
     from o3d_relief.scene.write import write_mesh
     from o3d_relief.show.camera import view_direction
     from o3d_relief.show.comparison import comparison_sheet
@@ -29,6 +31,8 @@ __all__ = [
     "ReliefError",
     "ReliefParams",
     "ReliefQuality",
+    "Scan",
+    "ScanParams",
     "SolverError",
     "View",
     "Yardstick",
@@ -38,9 +42,12 @@ __all__ = [
     "demo_scene",
     "make_relief",
     "measure_relief",
+    "mesh_from_points",
     "read_mesh",
+    "read_points",
     "render",
     "save_png",
+    "scan_points",
     "view_direction",
     "write_mesh",
 ]
@@ -60,7 +67,12 @@ _HOME = {
     "Yardstick": "measure",
     "measure_relief": "measure",
     "demo_scene": "scene.demo",
+    "ScanParams": "scan_params",
+    "Scan": "scene.scan",
+    "mesh_from_points": "scene.scan",
+    "scan_points": "scene.scan",
     "read_mesh": "scene.read",
+    "read_points": "scene.read",
     "write_mesh": "scene.write",
     "comparison_sheet": "show.comparison",
     "contact_sheet": "show.sheets",

@@ -12,10 +12,12 @@ from typing import NoReturn
 from o3d_relief import __version__
 from o3d_relief.limits import MAX_TRIANGLES
 from o3d_relief.params import ReliefParams, View
+from o3d_relief.scan_params import ScanParams
 
-__all__ = ["chosen_params", "chosen_view", "parse"]
+__all__ = ["chosen_params", "chosen_scan", "chosen_view", "parse"]
 
-_POINTS = ("--front", "--up", "--viewpoint", "--vanishing-point")
+_POINTS = ("--front", "--up", "--viewpoint", "--vanishing-point", "--sensor")
+_FORMATS = "PLY, OBJ, STL, OFF, GLB, glTF, PCD, XYZ, PTS, LAS or LAZ"
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$")
 _AXIS = re.compile(r"[+-]?[xyzXYZ]$")
 
@@ -99,12 +101,15 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND", dest="command")
 
     make = commands.add_parser(
-        "make", help="make a relief of a mesh file", description="Make a relief of a mesh file."
+        "make",
+        help="make a relief of a mesh or of a point cloud",
+        description="Make a relief of a mesh file, or of a point cloud, which is meshed first.",
     )
-    make.add_argument("input", type=Path, metavar="INPUT", help="PLY, OBJ, STL, OFF, GLB or glTF file")
+    make.add_argument("input", type=Path, metavar="INPUT", help=f"{_FORMATS} file")
     make.add_argument("output", type=Path, metavar="OUTPUT", help="PLY, OBJ, STL or GLB file")
     _add_view(make)
     _add_params(make)
+    _add_scan(make)
     make.add_argument(
         "--report", type=Path, metavar="FILE.json", help="write parameters, counts, times and depths"
     )
@@ -179,6 +184,55 @@ def _add_params(command: argparse.ArgumentParser) -> None:
     add("--alpha-min", type=float, metavar="A", help="smallest compression ratio (default: half of alpha)")
     add("--depth", type=float, metavar="D", help="exact depth in the input's unit, instead of alpha")
     add("--seed", type=int, default=default.seed, metavar="N", help="default: %(default)s")
+
+
+def _add_scan(command: argparse.ArgumentParser) -> None:
+    default = ScanParams()
+    add = command.add_argument_group("point clouds", "lengths are in spacings of the points").add_argument
+    add("--sensor", type=_point, metavar="X Y Z",
+        help="where the scanner stood, in the file's frame (default: found out)")  # fmt: skip
+    add("--remove-ground", action="store_true", help="remove the floor or table under the object")
+    add("--no-file-normals", dest="file_normals", action="store_false",
+        help="estimate normals, even if the file has good ones")  # fmt: skip
+    add("--scan-depth", type=int, metavar="N",
+        help="depth of the Poisson octree (default: cells as wide as the spacing)")  # fmt: skip
+    add("--max-points", type=int, default=default.max_points, metavar="N",
+        help="thin larger clouds, to save memory (default: %(default)s)")  # fmt: skip
+    add("--outliers", type=float, default=default.outliers, metavar="D",
+        help="drop points so many standard deviations off, 0 for none (default: %(default)s)")  # fmt: skip
+    add("--max-hole", type=float, default=default.max_hole, metavar="W",
+        help="close holes up to this width (default: %(default)s)")  # fmt: skip
+    add("--min-part", type=float, default=default.min_part, metavar="S",
+        help="drop parts with a smaller share of the area of the largest (default: %(default)s)")  # fmt: skip
+    add("--scan-threads", type=int, default=default.threads, metavar="N",
+        help="more than one: results differ a little from run to run (default: %(default)s)")  # fmt: skip
+
+
+def chosen_scan(options: argparse.Namespace) -> ScanParams:
+    """Return how a point cloud is to be meshed.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        Of the command "make".
+
+    Raises
+    ------
+    ParameterError
+        A value out of its range.
+    """
+    return ScanParams(
+        sensor=options.sensor,
+        remove_ground=options.remove_ground,
+        file_normals=options.file_normals,
+        depth=options.scan_depth,
+        max_points=options.max_points,
+        outliers=None if options.outliers == 0.0 else options.outliers,
+        max_hole=options.max_hole,
+        min_part=options.min_part,
+        threads=options.scan_threads,
+        seed=options.seed,
+    )
 
 
 def chosen_view(options: argparse.Namespace) -> View:

@@ -9,15 +9,19 @@ import sys
 import time
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from o3d_relief.arguments import chosen_params, chosen_view, parse
-from o3d_relief.errors import FileError, MeshError, ReliefError
+from o3d_relief.arguments import chosen_params, chosen_scan, chosen_view, parse
+from o3d_relief.errors import FileError, MeshError, ParameterError, ReliefError
 from o3d_relief.files import check_exists, check_place, write_bytes
 from o3d_relief.params import ReliefParams
+from o3d_relief.scan_params import ScanParams
 
 if TYPE_CHECKING:
+    from open3d.geometry import PointCloud, TriangleMesh
+
     from o3d_relief.pipeline import Relief
     from o3d_relief.records import StageRecord
 
@@ -82,23 +86,22 @@ def _tell_stage(record: StageRecord) -> None:
 
 
 def _make(options: argparse.Namespace) -> None:
-    params, view = chosen_params(options), chosen_view(options)
+    params, view, scan = chosen_params(options), chosen_view(options), chosen_scan(options)
     check_exists(options.input)
     _check_places(options)
 
     from o3d_relief.pipeline import make_relief
-    from o3d_relief.scene.read import read_mesh_and_notes
     from o3d_relief.scene.write import check_writable, lost_attributes, write_mesh
 
     check_writable(options.output)
     started = time.perf_counter()
-    mesh, notes = read_mesh_and_notes(options.input)
-    _tell(f"{options.input}: {len(mesh.vertices)} vertices, {len(mesh.triangles)} triangles")
-    for note in [*notes, *lost_attributes(options.output, mesh)]:
-        _tell(note)
+    scene, meshing = _read(options.input, scan)
+    if meshing is None:
+        for note in lost_attributes(options.output, scene):
+            _tell(note)
     try:
         relief = make_relief(
-            mesh, params, view=view, on_stage=_tell_stage, max_triangles=options.max_triangles
+            scene, params, view=view, scan=meshing, on_stage=_tell_stage, max_triangles=options.max_triangles
         )
     except MeshError as error:
         raise MeshError(f"{options.input}: {error}") from error
@@ -110,6 +113,32 @@ def _make(options: argparse.Namespace) -> None:
     if options.stages is not None:
         _write_stages(options.stages, relief)
     _tell_result(options.output, relief, time.perf_counter() - started)
+
+
+def _read(path: Path, scan: ScanParams) -> tuple[TriangleMesh | PointCloud, ScanParams | None]:
+    """Read the scene and say what it is; return it and, for a point cloud, how to mesh it."""
+    from o3d_relief.scene.arrays import MeshArrays, to_open3d
+    from o3d_relief.scene.read import left_out, read_arrays
+
+    arrays = read_arrays(path)
+    if isinstance(arrays, MeshArrays):
+        _tell(f"{path}: {len(arrays.vertices)} vertices, {len(arrays.faces)} triangles")
+        for note in left_out(path, arrays):
+            _tell(note)
+        if scan != ScanParams(seed=scan.seed):
+            raise ParameterError(f"{path} is a mesh: the options for scans are for point clouds only.")
+        return to_open3d(arrays), None
+    carried = [
+        name
+        for name, there in (("colours", arrays.colors is not None), ("normals", arrays.normals is not None))
+        if there
+    ]
+    words = f", with {' and '.join(carried)}" if carried else ""
+    if arrays.sensor is not None and scan.sensor is None:
+        scan = replace(scan, sensor=arrays.sensor)
+        words += f", seen from {' '.join(f'{c:g}' for c in arrays.sensor)}"
+    _tell(f"{path}: a point cloud of {len(arrays.points)} points{words}; it is meshed first")
+    return arrays.to_open3d(), scan
 
 
 def _check_places(options: argparse.Namespace) -> None:

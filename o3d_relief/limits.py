@@ -12,7 +12,19 @@ __all__ = ["MAX_TRIANGLES", "available_memory", "check_file_size", "check_triang
 MAX_TRIANGLES = 10_000_000
 """Largest number of triangles that is accepted where no other is given; ten times a full scan."""
 
-_READING = {".ply": 10, ".obj": 15, ".stl": 10, ".off": 21, ".glb": 8, ".gltf": 8}
+_READING = {
+    ".ply": 10,
+    ".obj": 15,
+    ".stl": 10,
+    ".off": 21,
+    ".glb": 8,
+    ".gltf": 8,
+    ".pcd": 10,
+    ".xyz": 15,
+    ".pts": 15,
+    ".las": 15,
+    ".laz": 40,
+}
 """Bytes of memory for each byte of a file at the peak of reading it, measured on a million triangles."""
 
 _RELIEF = 1000

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import open3d as o3d
@@ -15,11 +14,14 @@ from numpy.typing import NDArray
 
 from o3d_relief.bounds.certificate import Certificate, certify
 from o3d_relief.errors import MeshError, ParameterError
+from o3d_relief.journal import Journal, OnStage
 from o3d_relief.linalg.laplacian import cotangent_laplacian
 from o3d_relief.output import trimmed_mesh
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.records import StageRecord, TrimStage
+from o3d_relief.scan_params import ScanParams
 from o3d_relief.scene.convert import mesh_arrays
+from o3d_relief.scene.scan import scan_points
 from o3d_relief.scene.weld import weld
 from o3d_relief.stages.trim import Trimmed
 from o3d_relief.steps import (
@@ -40,9 +42,6 @@ from o3d_relief.steps import (
 
 __all__ = ["Relief", "make_relief"]
 
-OnStage = Callable[[StageRecord], None]
-_Record = TypeVar("_Record", bound=StageRecord)
-
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Relief:
@@ -55,9 +54,10 @@ class Relief:
     to_scene : (4, 4) float64
         Takes the relief frame to the input's frame.
     source_index : (n_out,) int64
-        Input vertex of each output vertex, -1 for a vertex made by the cut.
+        Input vertex of each output vertex, -1 for a vertex made by the cut. The input of a point cloud
+        is its mesh, of the stage "parts".
     stages : mapping of str to StageRecord
-        One record for each stage, in order.
+        One record for each stage, in order; for a point cloud, those of its meshing come first.
     params : ReliefParams
     view : View
     certificate : Certificate
@@ -65,6 +65,8 @@ class Relief:
     trimmed : Trimmed
         How the cut was made: between which input vertices each output vertex lies, the input face of each
         output face.
+    scan : ScanParams or None
+        How the point cloud was meshed, if it was one.
     """
 
     mesh: o3d.geometry.TriangleMesh
@@ -74,6 +76,7 @@ class Relief:
     params: ReliefParams
     view: View
     trimmed: Trimmed
+    scan: ScanParams | None = None
 
     def __post_init__(self) -> None:
         self.to_scene.flags.writeable = False
@@ -135,6 +138,7 @@ class Relief:
         return {
             "params": asdict(self.params),
             "view": asdict(self.view),
+            "scan": None if self.scan is None else asdict(self.scan),
             "unit": scene.unit,
             "scene_depth": float(np.ptp(before)) * scene.unit,
             "scene_visible_depth": float(np.ptp(before[visible])) * scene.unit,
@@ -150,28 +154,12 @@ class Relief:
         }
 
 
-class _Journal:
-    """Keeps the records, gives each the time since the one before and tells the caller."""
-
-    def __init__(self, on_stage: OnStage | None) -> None:
-        self.stages: dict[str, StageRecord] = {}
-        self._on_stage = on_stage
-        self._since = time.perf_counter()
-
-    def keep(self, record: _Record) -> _Record:
-        timed = replace(record, seconds=time.perf_counter() - self._since)
-        self.stages[timed.name] = timed
-        if self._on_stage is not None:
-            self._on_stage(timed)
-        self._since = time.perf_counter()
-        return timed
-
-
 def make_relief(
-    mesh: o3d.geometry.TriangleMesh,
+    mesh: o3d.geometry.TriangleMesh | o3d.geometry.PointCloud,
     params: ReliefParams | None = None,
     *,
     view: View | None = None,
+    scan: ScanParams | None = None,
     on_stage: OnStage | None = None,
     max_triangles: int | None = None,
 ) -> Relief:
@@ -182,11 +170,13 @@ def make_relief(
 
     Parameters
     ----------
-    mesh : open3d.geometry.TriangleMesh
-        The scene; never modified.
+    mesh : open3d.geometry.TriangleMesh or open3d.geometry.PointCloud
+        The scene; never modified. A point cloud is meshed first, see `scan_points`.
     params : ReliefParams, optional
     view : View, optional
         Where the scene faces; by default z is towards the viewer and y up.
+    scan : ScanParams, optional
+        How a point cloud is meshed.
     on_stage : callable, optional
         Called with each stage's record as soon as the stage is done.
     max_triangles : int, optional
@@ -216,7 +206,13 @@ def make_relief(
     for name, value, kind in (("params", params, ReliefParams), ("view", view, View)):
         if not isinstance(value, kind):
             raise ParameterError(f"{name} must be a {kind.__name__}. Got {value!r} instead.")
-    journal = _Journal(on_stage)
+    scanned = None
+    if isinstance(mesh, o3d.geometry.PointCloud):
+        scanned = scan_points(mesh, scan, view=view, on_stage=on_stage)
+        mesh = scanned.mesh
+    elif scan is not None:
+        raise ParameterError("scan says how a point cloud is meshed, but the scene is a mesh: leave it out.")
+    journal = Journal(on_stage, None if scanned is None else scanned.stages)
 
     in_vertices, in_faces = mesh_arrays(mesh, max_triangles)
     frame = frame_step(in_vertices, in_faces, view)
@@ -261,4 +257,5 @@ def make_relief(
         params=params,
         view=view,
         trimmed=trimmed,
+        scan=None if scanned is None else scanned.params,
     )

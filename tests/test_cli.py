@@ -9,6 +9,7 @@ import numpy as np
 import open3d as o3d
 import pytest
 
+from o3d_relief.arguments import chosen_scan, parse
 from o3d_relief.cli import main
 from o3d_relief.scene.read import read_mesh
 from o3d_relief.scene.write import write_mesh
@@ -207,7 +208,44 @@ def test_input_without_triangles(tmp_path, capsys):
     path = tmp_path / "cloud.ply"
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(hills(5)[0]))
     o3d.io.write_point_cloud(str(path), cloud)
-    assert "no triangles" in _fails(capsys, "make", path, tmp_path / "r.ply")
+    sentence = _fails(capsys, "make", path, tmp_path / "r.ply")
+    assert "cloud.ply: A surface needs at least 50 points. Got the 25 points of the cloud" in sentence
+
+
+def test_point_cloud_is_noticed_and_meshed(tmp_path, capsys):
+    path, out, report = tmp_path / "cloud.ply", tmp_path / "relief.ply", tmp_path / "report.json"
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(hills(60)[0]))
+    cloud.paint_uniform_color([0.2, 0.4, 0.6])
+    o3d.io.write_point_cloud(str(path), cloud)
+    words = ["make", path, out, "-k", "8", "--max-hole", "3", "--report", report, "--sensor", "0", "0", "900"]
+    assert main([str(word) for word in words]) == 0
+    told = capsys.readouterr().err
+    assert "a point cloud of 3600 points, with colours; it is meshed first" in told
+    assert told.index("  points") < told.index("  parts") < told.index("  scene")
+    assert json.loads(report.read_text())["scan"]["sensor"] == [0.0, 0.0, 900.0]
+    assert json.loads(report.read_text())["scan"]["max_hole"] == 3.0
+    colors = np.asarray(read_mesh(out).vertex_colors)
+    np.testing.assert_allclose(colors, np.tile([0.2, 0.4, 0.6], (len(colors), 1)), atol=0.01)
+
+
+def test_organised_cloud_names_its_sensor(tmp_path, capsys):
+    path = tmp_path / "cloud.pcd"
+    head = (
+        "FIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nWIDTH 40\nHEIGHT 40\nVIEWPOINT 0 0 500 1 0 0 0\nDATA binary\n"
+    )
+    path.write_bytes(head.encode() + hills(40)[0].tobytes())
+    assert main(["make", str(path), str(tmp_path / "relief.ply"), "-k", "8"]) == 0
+    assert "a point cloud of 1600 points, seen from 0 0 500; it is meshed first" in capsys.readouterr().err
+
+
+def test_scan_options_need_a_point_cloud(tmp_path, scene, capsys):
+    sentence = _fails(capsys, "make", scene, tmp_path / "r.ply", "--remove-ground")
+    assert "scene.ply is a mesh: the options for scans are for point clouds only" in sentence
+
+
+def test_outliers_zero_keeps_all():
+    options = parse(["make", "a.ply", "b.ply", "--outliers", "0"])
+    assert chosen_scan(options).outliers is None
 
 
 @pytest.mark.parametrize(

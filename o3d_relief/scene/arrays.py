@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from o3d_relief.errors import MeshError
+
 if TYPE_CHECKING:
     import open3d as o3d
 
-__all__ = ["WHITE", "MeshArrays", "from_open3d", "mended", "to_open3d"]
+__all__ = ["WHITE", "CloudArrays", "MeshArrays", "cloud_arrays", "from_open3d", "mended", "to_open3d"]
 
 WHITE = np.full((1, 1, 3), 255, dtype=np.uint8)
 """The texture of a material that has none: colour = texture * vertex colour then holds everywhere."""
@@ -77,10 +79,10 @@ def to_open3d(arrays: MeshArrays) -> o3d.geometry.TriangleMesh:
     import open3d as o3d
 
     mesh = o3d.geometry.TriangleMesh()
-    mesh.vertices = o3d.utility.Vector3dVector(arrays.vertices)
+    mesh.vertices = o3d.utility.Vector3dVector(np.array(arrays.vertices))  # Open3D takes no read-only arrays
     mesh.triangles = o3d.utility.Vector3iVector(arrays.faces.astype(np.int32))
     if arrays.colors is not None:
-        mesh.vertex_colors = o3d.utility.Vector3dVector(arrays.colors)
+        mesh.vertex_colors = o3d.utility.Vector3dVector(np.array(arrays.colors))
     if arrays.normals is not None:
         mesh.vertex_normals = o3d.utility.Vector3dVector(arrays.normals)
     if arrays.triangle_uvs is not None:
@@ -172,3 +174,74 @@ def _to_rgb(pixels: NDArray[np.generic]) -> NDArray[np.uint8]:
         pixels = pixels // 257
     rgb = pixels.astype(np.uint8).reshape(*pixels.shape[:2], -1)
     return rgb[:, :, :3] if rgb.shape[2] >= 3 else np.repeat(rgb[:, :, :1], 3, axis=2)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CloudArrays:
+    """A point cloud as arrays.
+
+    Parameters
+    ----------
+    points : (n, 3) float64
+        In the file's unit; may be not finite.
+    colors : (n, 3) float64, optional
+        From 0 to 1.
+    normals : (n, 3) float64, optional
+        As they come.
+    sensor : three floats, optional
+        Where the scanner stood, if the file tells.
+    """
+
+    points: NDArray[np.float64]
+    colors: NDArray[np.float64] | None = None
+    normals: NDArray[np.float64] | None = None
+    sensor: tuple[float, float, float] | None = None
+
+    def to_open3d(self) -> o3d.geometry.PointCloud:
+        """Return an Open3D point cloud, with copies."""
+        import open3d as o3d
+
+        cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(self.points))
+        if self.colors is not None:
+            cloud.colors = o3d.utility.Vector3dVector(self.colors)
+        if self.normals is not None:
+            cloud.normals = o3d.utility.Vector3dVector(self.normals)
+        return cloud
+
+
+def cloud_arrays(cloud: o3d.geometry.PointCloud) -> CloudArrays:
+    """Copy an Open3D point cloud into arrays.
+
+    Colours and normals whose number does not fit are left out.
+
+    Parameters
+    ----------
+    cloud : open3d.geometry.PointCloud
+        Never modified.
+
+    Returns
+    -------
+    CloudArrays
+        Copies.
+
+    Raises
+    ------
+    MeshError
+        Not a PointCloud, or an empty one.
+    """
+    import open3d as o3d
+
+    if not isinstance(cloud, o3d.geometry.PointCloud):
+        kind = f"{type(cloud).__module__}.{type(cloud).__qualname__}"
+        raise MeshError(f"The scan must be an open3d.geometry.PointCloud. Got a {kind} instead.")
+    points, colors, normals = (
+        np.array(item, dtype=np.float64).reshape(-1, 3)
+        for item in (cloud.points, cloud.colors, cloud.normals)
+    )
+    if len(points) == 0:
+        raise MeshError("The point cloud is empty: it has no points.")
+    return CloudArrays(
+        points=points,
+        colors=colors if len(colors) == len(points) else None,
+        normals=normals if len(normals) == len(points) else None,
+    )

@@ -1,4 +1,4 @@
-"""Meshes from files: one strict reader for each format, behind one function."""
+"""Meshes and point clouds from files: one strict reader for each format."""
 
 from __future__ import annotations
 
@@ -13,20 +13,26 @@ from numpy.typing import NDArray
 
 from o3d_relief.errors import FileError, MeshError
 from o3d_relief.limits import check_file_size
-from o3d_relief.scene.arrays import MeshArrays, to_open3d
+from o3d_relief.scene.arrays import CloudArrays, MeshArrays, to_open3d
 from o3d_relief.scene.gltf import decode_gltf
+from o3d_relief.scene.las import decode_las
 from o3d_relief.scene.obj import decode_obj
 from o3d_relief.scene.off import decode_off
+from o3d_relief.scene.pcd import decode_pcd
 from o3d_relief.scene.ply import decode_ply
+from o3d_relief.scene.point_lists import decode_point_list
 from o3d_relief.scene.stl import decode_stl
 
 if TYPE_CHECKING:
     import open3d as o3d
 
-__all__ = ["READABLE", "read_mesh", "read_mesh_and_notes"]
+__all__ = ["READABLE", "READABLE_CLOUDS", "left_out", "read_arrays", "read_mesh", "read_points"]
 
 READABLE = (".ply", ".obj", ".stl", ".off", ".glb", ".gltf")
 """The file endings that `read_mesh` reads."""
+
+READABLE_CLOUDS = (".pcd", ".xyz", ".xyzn", ".xyzrgb", ".pts", ".las", ".laz")
+"""The file endings that only point clouds have; PLY, OBJ and OFF files may hold some, too."""
 
 
 def read_mesh(path: str | Path) -> o3d.geometry.TriangleMesh:
@@ -62,11 +68,19 @@ def read_mesh(path: str | Path) -> o3d.geometry.TriangleMesh:
     --------
     >>> mesh = read_mesh("box.ply")  # doctest: +SKIP
     """
-    return read_mesh_and_notes(path)[0]
+    arrays = read_arrays(path)
+    if isinstance(arrays, CloudArrays):
+        raise MeshError(
+            f"{path} has no triangles, only {len(arrays.points)} points: read this cloud with read_points."
+        )
+    return to_open3d(arrays)
 
 
-def read_mesh_and_notes(path: str | Path) -> tuple[o3d.geometry.TriangleMesh, list[str]]:
-    """Read a mesh like `read_mesh`, and say what of the file was left out.
+def read_points(path: str | Path) -> o3d.geometry.PointCloud:
+    """Read a point cloud from a PLY, PCD, XYZ, PTS, LAS or LAZ file, or an OBJ or OFF file without faces.
+
+    Points keep the order of the file. Colours and normals come along as they are. Points that are not
+    finite are read as they are. LAS and LAZ need the packages laspy and lazrs.
 
     Parameters
     ----------
@@ -75,29 +89,87 @@ def read_mesh_and_notes(path: str | Path) -> tuple[o3d.geometry.TriangleMesh, li
 
     Returns
     -------
-    mesh : open3d.geometry.TriangleMesh
-    notes : list of str
-        A sentence each, none as a rule.
+    open3d.geometry.PointCloud
+        At least one point, in the file's unit and frame.
 
     Raises
     ------
-    FileError, MeshError
-        As by `read_mesh`.
+    FileError
+        The file is missing, unreadable, damaged, too short, or of a format that is not read.
+    MeshError
+        The file has triangles, or nothing in it.
+
+    Examples
+    --------
+    >>> cloud = read_points("scan.ply")  # doctest: +SKIP
+    """
+    arrays = read_arrays(path)
+    if isinstance(arrays, MeshArrays):
+        raise MeshError(f"{path} is a mesh of {len(arrays.faces)} triangles: read it with read_mesh.")
+    return arrays.to_open3d()
+
+
+def read_arrays(path: str | Path) -> MeshArrays | CloudArrays:
+    """Read a mesh or a point cloud, whichever the file holds.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Returns
+    -------
+    MeshArrays or CloudArrays
+        A mesh with at least one triangle and all indices in range, or a cloud with at least one point.
+
+    Raises
+    ------
+    FileError
+        The file is missing, unreadable, damaged, too short, or of a format that is not read.
+    MeshError
+        There is nothing in the file.
     """
     path = Path(path)
     data = _read_bytes(path)
     try:
-        arrays = _decode(path, data)
-        _check_indices(arrays)
+        if path.suffix.lower() in READABLE_CLOUDS:
+            arrays: MeshArrays | CloudArrays = _decode_cloud(path, data)
+        else:
+            arrays = _decode(path, data)
+            _check_indices(arrays)
     except FileError as error:
         raise FileError(f"{path} cannot be read: {error}. Export it again or use another copy.") from error
-    if len(arrays.faces) == 0:
-        what = f"only {len(arrays.vertices)} points" if len(arrays.vertices) else "nothing in it"
-        raise MeshError(f"{path} has no triangles, {what}: a relief needs a mesh, so make one first.")
-    notes = [
+    if isinstance(arrays, MeshArrays) and len(arrays.faces) == 0:
+        arrays = CloudArrays(points=arrays.vertices, colors=arrays.colors, normals=arrays.normals)
+    if isinstance(arrays, CloudArrays) and len(arrays.points) == 0:
+        raise MeshError(f"{path} has no triangles, nothing in it: use another copy.")
+    return arrays
+
+
+def left_out(path: str | Path, arrays: MeshArrays) -> list[str]:
+    """Say what of a mesh file was left out.
+
+    Parameters
+    ----------
+    path : str or Path
+    arrays : MeshArrays
+        What was read from it.
+
+    Returns
+    -------
+    list of str
+        A sentence each, none as a rule.
+    """
+    return [
         f"{path} names {name}, which cannot be read: what it colours is left plain" for name in arrays.missing
     ]
-    return to_open3d(arrays), notes
+
+
+def _decode_cloud(path: Path, data: bytes) -> CloudArrays:
+    kind = path.suffix.lower()
+    if kind == ".pcd":
+        return decode_pcd(data)
+    return decode_las(data) if kind in (".las", ".laz") else decode_point_list(data)
 
 
 def _read_bytes(path: Path) -> bytes:
@@ -106,8 +178,9 @@ def _read_bytes(path: Path) -> bytes:
             raise FileError(f"{path} is a folder: give the name of a file in it.")
         if not path.exists():
             raise FileError(f"{path} does not exist: check its name and folder.")
-        if path.suffix.lower() not in READABLE:
-            raise FileError(f"{path} cannot be read: its ending must be one of {', '.join(READABLE)}.")
+        if path.suffix.lower() not in READABLE + READABLE_CLOUDS:
+            endings = ", ".join(READABLE + READABLE_CLOUDS)
+            raise FileError(f"{path} cannot be read: its ending must be one of {endings}.")
         if not path.is_file():
             raise FileError(f"{path} cannot be read: it is a device or a pipe. Save it as a file first.")
         check_file_size(path, path.stat().st_size)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-__all__ = ["SEAM", "Welded", "same_places", "weld"]
+__all__ = ["SEAM", "Welded", "first_of_equal_rows", "same_places", "weld"]
 
 SEAM = 1e-3
 """Open edges closer than this, in relief units (1e-5 of the extent), belong together.
@@ -53,7 +53,7 @@ class Welded:
     duplicate_faces: int
 
 
-def _first_of_equal_rows(rows: NDArray[np.float64]) -> NDArray[np.int64]:
+def first_of_equal_rows(rows: NDArray[np.float64]) -> NDArray[np.int64]:
     """Find for each row of (n, c) the first one that equals it, (n,)."""
     order = np.lexsort(rows.T)  # stable: equal rows stay in input order
     ordered = rows[order]
@@ -97,7 +97,7 @@ def same_places(
     >>> same_places(v, np.array([[0, 1, 2], [3, 5, 4]])).tolist()
     [0, 1, 2, 1, 2, 5]
     """
-    first = _first_of_equal_rows(vertices)
+    first = first_of_equal_rows(vertices)
     rim = _rim(first[faces])
     near = cKDTree(vertices[rim]).query_pairs(tolerance, output_type="ndarray")
     if len(near) == 0:
@@ -146,7 +146,7 @@ def weld(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Welded:
     merged = stands_for[faces]
     whole = _whole(merged)
     candidates = merged[whole]
-    same = _first_of_equal_rows(np.sort(candidates, axis=1).astype(np.float64))
+    same = first_of_equal_rows(np.sort(candidates, axis=1).astype(np.float64))
     is_first = same == np.arange(len(same))
     kept = candidates[is_first]
     used = np.zeros(len(vertices), dtype=bool)

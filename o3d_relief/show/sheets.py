@@ -15,6 +15,7 @@ from o3d_relief.records import StageRecord
 from o3d_relief.show.annotate import font_size, write
 from o3d_relief.show.camera import fit_scale, view_direction
 from o3d_relief.show.render import plate_bounds, render, save_png
+from o3d_relief.show.scan_panels import SCAN_PANELS
 from o3d_relief.show.stage_panels import PANELS, Easel
 
 if TYPE_CHECKING:
@@ -167,11 +168,12 @@ def stage_picture(
     ParameterError
         An unknown stage, or a record that is missing.
     """
-    if name not in PANELS:
-        raise ParameterError(f"name must be one of {', '.join(PANELS)}. Got {name!r} instead.")
+    panels = {**SCAN_PANELS, **PANELS}
+    if name not in panels:
+        raise ParameterError(f"name must be one of {', '.join(panels)}. Got {name!r} instead.")
     gap = 8
     easel = Easel(stages=stages, size=((size[0] - gap) // 2, size[1]), relief=relief)
-    return contact_sheet(PANELS[name](easel), 2, gap=size[0] - 2 * easel.size[0])
+    return contact_sheet(panels[name](easel), 2, gap=size[0] - 2 * easel.size[0])
 
 
 def save_stage_pictures(
@@ -183,6 +185,8 @@ def save_stage_pictures(
     on_picture: Callable[[Path], None] | None = None,
 ) -> list[Path]:
     """Write a picture of each stage that has a record: 01_scene.png, 02_perspective.png, ...
+
+    Where the scene was a point cloud, the stages of its meshing come first: 01_points.png, ...
 
     Parameters
     ----------
@@ -210,7 +214,8 @@ def save_stage_pictures(
     if not folder.is_dir():
         raise FileError(f"The folder {str(folder)!r} does not exist.")
     paths = []
-    for number, name in enumerate(PANELS, start=1):
+    names = [*SCAN_PANELS, *PANELS] if SCAN_PANELS.keys() & stages.keys() else [*PANELS]
+    for number, name in enumerate(names, start=1):
         if name in stages:
             paths.append(folder / f"{number:02d}_{name}.png")
             save_png(paths[-1], stage_picture(name, stages, relief=relief, size=size))

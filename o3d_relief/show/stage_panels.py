@@ -30,14 +30,15 @@ from o3d_relief.show.render import render
 if TYPE_CHECKING:
     import open3d as o3d
 
-__all__ = ["PANELS", "Easel"]
+__all__ = ["OBLIQUE", "PANELS", "Easel", "Pictures"]
 
 Pictures = list[NDArray[np.uint8]]
 Vector = tuple[float, float, float]
 _Record = TypeVar("_Record", bound=StageRecord)
 
 _FRONT: Vector = (0.0, 0.0, 1.0)
-_OBLIQUE = view_direction(38.0, 12.0)
+OBLIQUE = view_direction(38.0, 12.0)
+"""From where most right panels are seen."""
 _NEAR_FRONT = view_direction(22.0, 10.0)
 _SIDE = view_direction(65.0, 8.0)
 _GAP = 4  # pixels
@@ -110,7 +111,7 @@ def _scene(easel: Easel) -> Pictures:
     title = f"scene: {len(record.vertices)} vertices, {len(record.faces)} faces"
     return [
         render(mesh, size=easel.size, title=title),
-        render(mesh, size=easel.size, direction=_OBLIQUE, title="from the side"),
+        render(mesh, size=easel.size, direction=OBLIQUE, title="from the side"),
     ]
 
 
@@ -120,7 +121,7 @@ def _perspective(easel: Easel) -> Pictures:
     bounds = _bounds(before, after)
     titles = ("before the forced perspective", "after" if changed else "after: no vanishing point, unchanged")
     return [
-        render(easel.mesh(vertices), size=easel.size, direction=_OBLIQUE, bounds=bounds, title=title)
+        render(easel.mesh(vertices), size=easel.size, direction=OBLIQUE, bounds=bounds, title=title)
         for vertices, title in zip((before, after), titles, strict=True)
     ]
 
@@ -162,7 +163,7 @@ def _clusters(easel: Easel) -> Pictures:
         title=title,
     )
     side = render(
-        mesh, size=easel.size, direction=_OBLIQUE, colors=colors, sharp_colors=True, title="from the side"
+        mesh, size=easel.size, direction=OBLIQUE, colors=colors, sharp_colors=True, title="from the side"
     )
     return [front, side]
 
@@ -210,7 +211,7 @@ def _construction(easel: Easel) -> Pictures:
     z = easel.record(ConstructionStage).z
     vertices = easel.raised(z)
     mesh = easel.mesh(vertices)
-    shape = render(mesh, size=easel.size, direction=_OBLIQUE, title="construction")
+    shape = render(mesh, size=easel.size, direction=OBLIQUE, title="construction")
     title = f"height: {z.min():.1f} to {z.max():.1f} (it was 0 to {easel.vertices[:, 2].max():.1f})"
     height = render(mesh, size=easel.size, field=z, field_label="z", title=title)
     return [shape, height]
@@ -287,7 +288,7 @@ def _trim(easel: Easel) -> Pictures:
         mesh = easel.mesh(easel.raised(easel.record(CompressionStage).z))
     return [
         render(mesh, size=easel.size, plate=True, title="the relief"),
-        render(mesh, size=easel.size, direction=_OBLIQUE, plate=True, title="from the side"),
+        render(mesh, size=easel.size, direction=OBLIQUE, plate=True, title="from the side"),
     ]
 
 

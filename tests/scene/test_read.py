@@ -13,8 +13,9 @@ from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
 from o3d_relief.errors import FileError, MeshError
+from o3d_relief.scene.arrays import to_open3d
 from o3d_relief.scene.polygons import fan, strips
-from o3d_relief.scene.read import READABLE, read_mesh, read_mesh_and_notes
+from o3d_relief.scene.read import READABLE, left_out, read_arrays, read_mesh
 
 CORNERS = np.array(
     [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [7, 7, 7]], dtype=float
@@ -22,6 +23,11 @@ CORNERS = np.array(
 PLY_HEADER = "ply\nformat {} 1.0\ncomment made here\nelement vertex 5\n"
 PLY_HEADER += "".join(f"property double {axis}\n" for axis in "xyz")
 PLY_FACES = "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
+
+
+def _mesh_and_notes(path):
+    arrays = read_arrays(path)
+    return to_open3d(arrays), left_out(path, arrays)
 
 
 def save(path, content):
@@ -166,7 +172,7 @@ class TestPly:
         header = header.replace("comment made", "comment") + "property float s\nproperty float t\n"
         rows = "".join(f"{x} {y} {z} 0 0\n" for x, y, z in CORNERS)
         path = save(tmp_path / "a.ply", header + PLY_FACES + rows + "3 0 1 2\n3 0 2 3\n")
-        assert read_mesh_and_notes(path)[1] == [
+        assert _mesh_and_notes(path)[1] == [
             f"{path} names gone.png, which cannot be read: what it colours is left plain"
         ]
 
@@ -274,7 +280,7 @@ class TestObj:
 
     def test_missing_material_library(self, tmp_path, capfd):
         path = save(tmp_path / "a.obj", QUAD_OBJ)
-        mesh, notes = read_mesh_and_notes(path)
+        mesh, notes = _mesh_and_notes(path)
         assert notes == [f"{path} names a.mtl, which cannot be read: what it colours is left plain"]
         assert len(mesh.triangles) == 4
         assert len(mesh.textures) == 0
@@ -286,7 +292,7 @@ class TestObj:
         save(tmp_path / "a.mtl", QUAD_MTL)
         if content:
             save(tmp_path / "wood.png", content)
-        mesh, notes = read_mesh_and_notes(save(tmp_path / "a.obj", QUAD_OBJ))
+        mesh, notes = _mesh_and_notes(save(tmp_path / "a.obj", QUAD_OBJ))
         assert len(notes) == 1
         assert "names textures\\wood.png, which cannot be read" in notes[0]
         assert [np.asarray(texture).tolist() for texture in mesh.textures] == [
@@ -308,7 +314,7 @@ class TestObj:
         for name in there:
             save(tmp_path / name, QUAD_MTL.replace("map_Kd", "#"))
         path = save(tmp_path / "c.obj", QUAD_OBJ.replace("mtllib a.mtl", line))
-        mesh, notes = read_mesh_and_notes(path)
+        mesh, notes = _mesh_and_notes(path)
         assert [note.split(" names ")[1].split(",")[0] for note in notes] == missing
         assert len(mesh.textures) == (2 if there else 0)
 
@@ -519,7 +525,7 @@ class TestGlb:
         for name, content in files.items():
             save(tmp_path / name, content)
         path = save(tmp_path / "a.gltf", json.dumps(tree))
-        mesh, notes = read_mesh_and_notes(path)
+        mesh, notes = _mesh_and_notes(path)
         assert notes == [f"{path} names gone.png, which cannot be read: what it colours is left plain"]
         assert len(mesh.triangles) == 12
 
@@ -633,7 +639,7 @@ class TestBombs:
         with pytest.raises(FileError, match=r"a\.ply cannot be read: it is a device or a pipe\."):
             read_mesh(tmp_path / "a.ply")
         path = save(tmp_path / "a.obj", QUAD_OBJ.replace("a.mtl", "/dev/zero"))
-        assert "names /dev/zero, which cannot be read" in read_mesh_and_notes(path)[1][0]
+        assert "names /dev/zero, which cannot be read" in _mesh_and_notes(path)[1][0]
         files = trimesh.Scene(trimesh.creation.box()).export(file_type="gltf")
         tree = json.loads(files["model.gltf"])
         tree["buffers"][0]["uri"] = "/dev/zero"
@@ -645,7 +651,7 @@ class TestBombs:
         save(tmp_path / "wood.png", bytes(10_000))
         path = save(tmp_path / "a.obj", QUAD_OBJ)
         monkeypatch.setattr("o3d_relief.limits.available_memory", lambda: 9_000)
-        assert "wood.png, which cannot be read" in read_mesh_and_notes(path)[1][0]
+        assert "wood.png, which cannot be read" in _mesh_and_notes(path)[1][0]
 
     def test_names_in_a_gltf_file_may_be_escaped(self, tmp_path):
         files = trimesh.Scene(trimesh.creation.box()).export(file_type="gltf")
@@ -710,7 +716,9 @@ class TestRefusals:
         ],
     )
     def test_point_cloud(self, tmp_path, name, content):
-        with pytest.raises(MeshError, match="has no triangles, only 5 points: a relief needs a mesh"):
+        with pytest.raises(
+            MeshError, match="has no triangles, only 5 points: read this cloud with read_points"
+        ):
             read_mesh(save(tmp_path / name, content))
 
     @pytest.mark.parametrize("content", [bytes(84), b"solid nothing\nendsolid nothing\n"])

@@ -181,7 +181,7 @@ def test_a_missing_record_is_named(name):
 
 
 def test_an_unknown_stage_raises(stages):
-    with pytest.raises(ParameterError, match=r"name must be one of scene, .*Got 'carving' instead"):
+    with pytest.raises(ParameterError, match=r"name must be one of points, .*Got 'carving' instead"):
         stage_picture("carving", stages, size=SIZE)
 
 

@@ -1,0 +1,1 @@
+"""From points to a surface: what a scan goes through before it is a scene."""
