@@ -50,7 +50,8 @@ class PlateParams:
     nozzle_mm : float
         Width of the line that the printer lays; no wall can be thinner.
     hanging : str
-        "none", "keyhole" (for the head of a screw, up to 8 mm) or "magnets" (pockets for round ones), in the back.
+        "none", or in the back a "keyhole" (for the head of a screw, up to 8 mm) or "magnets" (pockets for
+        round ones).
     magnet_mm, magnet_height_mm : float
         Diameter and thickness of the magnets; the pockets have 0.2 mm of play.
     loose : str
@@ -135,9 +136,10 @@ class PlateParams:
             raise ParameterError(
                 f"embed_mm must be less than base_mm, {self.base_mm:g}. Got {self.embed_mm:g} instead."
             )
-        if self.pocket_mm + self.min_wall_mm > self.base_mm:
+        least = self.pocket_mm + self.min_wall_mm
+        if self.hanging != "none" and least > self.base_mm:
             raise ParameterError(
-                f"base_mm must be at least {self.pocket_mm + self.min_wall_mm:g} for hanging={self.hanging!r}. "
+                f"base_mm must be at least {least:g} for hanging={self.hanging!r}. "
                 f"Got {self.base_mm:g} instead."
             )
 

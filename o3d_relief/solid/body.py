@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,24 +40,32 @@ class Solid:
     is_plate : (m,) bool
         True for faces that are not the relief's own surface: plate, back, cuts. Where there are
         colours these have PLATE_COLOR; the vertices at the seam carry the colour of the relief.
+    counts : mapping of str to float
+        What was settled on the way (parts closed in each way, loose bodies, voids filled, ...).
     """
 
     vertices: NDArray[np.float64]
     faces: NDArray[np.int64]
     colors: NDArray[np.float64] | None = None
     is_plate: NDArray[np.bool_]
+    counts: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for item in fields(self):
             value = getattr(self, item.name)
-            if value is not None:
+            if isinstance(value, np.ndarray):
                 frozen = value.view()  # the caller's own array stays as it is
                 frozen.flags.writeable = False
                 object.__setattr__(self, item.name, frozen)
+        object.__setattr__(self, "counts", MappingProxyType(dict(self.counts)))
 
     def __repr__(self) -> str:
         x, y, z = self.size
         return f"<Solid: {len(self.faces)} triangles, {x:.2f} x {y:.2f} x {z:.2f} mm>"
+
+    def __reduce__(self) -> tuple[Callable[..., Solid], tuple[dict[str, Any]]]:
+        values = {item.name: getattr(self, item.name) for item in fields(self)}
+        return _restored, (values | {"counts": dict(self.counts)},)
 
     @property
     def size(self) -> NDArray[np.float64]:
@@ -150,6 +160,10 @@ class Solid:
             colors = np.empty((len(used), 3))
             colors[index[order]] = np.clip(properties[order, 3:6], 0.0, 1.0)
         return cls(vertices=properties[used, :3], faces=index[corners], colors=colors, is_plate=is_plate)
+
+
+def _restored(values: dict[str, Any]) -> Solid:
+    return Solid(**values)
 
 
 def manifold_of(

@@ -1,0 +1,131 @@
+"""Thickness for surfaces that have none."""
+
+from __future__ import annotations
+
+import numpy as np
+import open3d as o3d
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from o3d_relief.rays import unit_box
+from o3d_relief.solid.chain import boundary
+from o3d_relief.solid.orient import neighbours
+from o3d_relief.solid.pieces import Piece
+
+__all__ = ["charts", "room_behind", "shells"]
+
+_CREASE = 0.77
+"""Cosine of 40 degrees: charts end at sharper edges."""
+_CONE = 0.5
+"""Cosine of 60 degrees: charts whose normals turn away further from their mean are split."""
+_SHARE = 0.55
+"""Share of the room up to the next wall that a wall may take: two of them then meet in the middle."""
+
+
+def shells(piece: Piece, thickness: float) -> list[Piece]:
+    """Turn an open surface into closed ones of some thickness, which together are as thick as asked for.
+
+    The surface itself stays in place and the thickness goes to its back. It is taken apart into charts
+    that are nearly flat first, so that no shell folds over into itself; the union of all is meant.
+
+    Parameters
+    ----------
+    piece : Piece
+        Faces turn to the side from which the surface is seen.
+    thickness : float
+        In millimetres; less where a wall of the same piece lies closer behind.
+
+    Returns
+    -------
+    list of Piece
+        Each without boundary.
+    """
+    chart = charts(piece)
+    room = room_behind(piece)
+    result = []
+    order = np.argsort(chart, kind="stable")
+    for rows in np.split(order, np.flatnonzero(np.diff(chart[order])) + 1):
+        result.append(
+            _shell(piece.only(rows), np.minimum(thickness, _SHARE * room[np.unique(piece.faces[rows])]))
+        )
+    return result
+
+
+def charts(piece: Piece) -> NDArray[np.int64]:
+    """Take a surface apart into nearly flat pieces.
+
+    Parameters
+    ----------
+    piece : Piece
+
+    Returns
+    -------
+    (m,) int64
+        Chart of each face: connected, without sharp edges, its normals within one octant or a narrow cone.
+    """
+    normals = piece.area_normals()
+    area = np.linalg.norm(normals, axis=1)
+    unit = normals / np.where(area > 0.0, area, 1.0)[:, None]
+    pairs, _ = neighbours(piece.faces)
+    smooth = pairs[(unit[pairs[:, 0]] * unit[pairs[:, 1]]).sum(axis=1) >= _CREASE]
+    label = _connected(smooth, len(unit))
+    mean = np.stack([np.bincount(label, weights=along) for along in normals.T], axis=1)
+    mean = mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-300)
+    narrow = np.ones(label.max() + 1)
+    np.minimum.at(narrow, label, (unit * mean[label]).sum(axis=1))
+    wide = narrow[label] < _CONE
+    side = np.abs(unit).argmax(axis=1)
+    side = 1 + 2 * side + (np.take_along_axis(unit, side[:, None], axis=1)[:, 0] > 0)
+    side = np.where(wide, side, 0)
+    return _connected(smooth[side[smooth[:, 0]] == side[smooth[:, 1]]], len(unit))
+
+
+def room_behind(piece: Piece) -> NDArray[np.float64]:
+    """Measure how far behind each vertex the next wall of the same piece is.
+
+    Parameters
+    ----------
+    piece : Piece
+
+    Returns
+    -------
+    (n,) float64
+        In millimetres, infinite where there is none.
+    """
+    normals = _vertex_normals(piece)
+    scene, middle, size = unit_box(piece.vertices, piece.faces)
+    start = (piece.vertices - middle) / size - 1e-4 * normals
+    rays = np.concatenate([start, -normals], axis=1).astype(np.float32)
+    hit = scene.cast_rays(o3d.core.Tensor(rays))["t_hit"].numpy().astype(np.float64)
+    return np.asarray((hit + 1e-4) * size)
+
+
+def _shell(chart: Piece, thickness: NDArray[np.float64]) -> Piece:
+    """Close a chart with a copy of itself behind it and walls between."""
+    count = len(chart.vertices)
+    edges = boundary(chart.faces)
+    behind = chart.vertices - thickness[:, None] * _vertex_normals(chart)
+    (a, b), (c, d) = edges.T, (edges + count).T
+    walls = np.concatenate([np.stack([b, a, c], axis=1), np.stack([b, c, d], axis=1)])
+    return chart.with_copies(np.arange(count), behind).with_faces(chart.faces[:, ::-1] + count, walls)
+
+
+def _vertex_normals(piece: Piece) -> NDArray[np.float64]:
+    """(n, 3) unit normals, weighted by area; +z where they cancel."""
+    count = len(piece.vertices)
+    normals = piece.area_normals()
+    total = np.stack(
+        [
+            np.bincount(piece.faces.ravel(), weights=np.repeat(along, 3), minlength=count)
+            for along in normals.T
+        ],
+        axis=1,
+    )
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    return np.where(length > 0.0, total / np.where(length > 0.0, length, 1.0), [0.0, 0.0, 1.0])
+
+
+def _connected(pairs: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
