@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from o3d_relief.errors import ParameterError
 from o3d_relief.params import check_number, check_range
 
-__all__ = ["HANGINGS", "LOOSE", "SHAPES", "PlateParams"]
+__all__ = ["HANGINGS", "LOOSE", "PRINT_DIRECTIONS", "SHAPES", "PlateParams"]
 
 SHAPES = ("rectangle", "ellipse", "contour", "none")
 HANGINGS = ("none", "keyhole", "magnets")
 LOOSE = ("report", "bridge", "remove")
+PRINT_DIRECTIONS = ("x", "y", "z")
 
 _KEYHOLE_DEPTH = 3.8
 """Millimetres from the back: a lip of 1.5 and room of 2.3 for the head of a screw."""
@@ -58,6 +59,11 @@ class PlateParams:
         What becomes of parts that touch nothing: "report" keeps them and says so, "bridge" ties each to
         what lies behind it with a pin, "remove" leaves them out.
 
+    print_direction : str
+        "z" prints the object lying on its back, "y" standing, "x" on its left edge: up, in print.
+    overhang_degrees : float
+        Faces that lean out further than this from the vertical need support.
+
     Raises
     ------
     ParameterError
@@ -84,9 +90,16 @@ class PlateParams:
     magnet_mm: float = 10.0
     magnet_height_mm: float = 2.0
     loose: str = "report"
+    print_direction: str = "z"
+    overhang_degrees: float = 45.0
 
     def __post_init__(self) -> None:
-        for name, choices in (("shape", SHAPES), ("hanging", HANGINGS), ("loose", LOOSE)):
+        for name, choices in (
+            ("shape", SHAPES),
+            ("hanging", HANGINGS),
+            ("loose", LOOSE),
+            ("print_direction", PRINT_DIRECTIONS),
+        ):
             value = getattr(self, name)
             if value not in choices:
                 raise ParameterError(f"{name} must be one of {', '.join(choices)}. Got {value!r} instead.")
@@ -102,6 +115,8 @@ class PlateParams:
             object.__setattr__(self, name, number)
         for name in ("margin_mm", "frame_mm"):
             object.__setattr__(self, name, check_range(name, getattr(self, name), 0.0, _LARGEST))
+        degrees = check_range("overhang_degrees", self.overhang_degrees, 0.0, 90.0)
+        object.__setattr__(self, "overhang_degrees", degrees)
         self._check_together()
 
     def _check_together(self) -> None:

@@ -91,14 +91,25 @@ class Solid:
         return np.where(self.is_plate[:, None, None], PLATE_COLOR, self.colors[self.faces])
 
     def to_open3d(self) -> o3d.geometry.TriangleMesh:
-        """Copy the solid to an Open3D mesh, with its vertex colours."""
+        """Copy the solid to an Open3D mesh.
+
+        Returns
+        -------
+        open3d.geometry.TriangleMesh
+            Where there are colours, the vertices of the seam are there twice, so that the relief's colours
+            do not run over the plate.
+        """
         import open3d as o3d
 
+        place, rgb, _, corners = self._split()
+        if self.colors is None:
+            place, corners = np.arange(len(self.vertices)), self.faces
         mesh = o3d.geometry.TriangleMesh(
-            o3d.utility.Vector3dVector(self.vertices), o3d.utility.Vector3iVector(self.faces.astype(np.int32))
+            o3d.utility.Vector3dVector(self.vertices[place]),
+            o3d.utility.Vector3iVector(corners.astype(np.int32)),
         )
         if self.colors is not None:
-            mesh.vertex_colors = o3d.utility.Vector3dVector(self.colors)
+            mesh.vertex_colors = o3d.utility.Vector3dVector(rgb)
         return mesh
 
     def to_manifold(self) -> manifold3d.Manifold:
@@ -114,17 +125,29 @@ class Solid:
         MeshError
             The mesh is not a manifold.
         """
-        # A vertex of the seam is there twice: with the plate's and with the relief's properties.
-        keys = 2 * self.faces + self.is_plate[:, None]
-        used, corners = np.unique(keys, return_inverse=True)
-        place, plate = used // 2, (used % 2).astype(bool)
-        rgb = np.ones((len(used), 3)) if self.colors is None else self.colors[place]
-        if self.colors is not None:
-            rgb = np.where(plate[:, None], PLATE_COLOR, rgb)
+        place, rgb, plate, corners = self._split()
         twins = np.flatnonzero(place[1:] == place[:-1]) + 1
-        return _build(
-            np.column_stack([self.vertices[place], rgb, plate]), corners.reshape(-1, 3), twins, twins - 1
-        )
+        return _build(np.column_stack([self.vertices[place], rgb, plate]), corners, twins, twins - 1)
+
+    def _split(
+        self,
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_], NDArray[np.int64]]:
+        """Take the vertices of the seam twice: with the relief's and with the plate's colour.
+
+        Returns
+        -------
+        place : (q,) int64
+            The vertex that each is a copy of.
+        rgb : (q, 3) float64
+        plate : (q,) bool
+        corners : (m, 3) int64
+        """
+        used, corners = np.unique(2 * self.faces + self.is_plate[:, None], return_inverse=True)
+        place, plate = used // 2, (used % 2).astype(bool)
+        rgb = np.ones((len(used), 3))
+        if self.colors is not None:
+            rgb = np.where(plate[:, None], PLATE_COLOR, self.colors[place])
+        return place, rgb, plate, corners.reshape(-1, 3)
 
     @classmethod
     def from_manifold(cls, manifold: manifold3d.Manifold, *, colored: bool) -> Solid:

@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import connected_components
 
 from o3d_relief.scene.weld import first_of_equal_rows
 
-__all__ = ["boundary", "edge_components", "loops", "one_of_each", "volume", "without_opposites"]
+__all__ = ["bodies", "boundary", "edge_components", "loops", "one_of_each", "volume", "without_opposites"]
 
 
 def one_of_each(faces: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -80,6 +80,32 @@ def edge_components(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     label = connected_components(graph, directed=False)[1][:count]
     _, first, inverse = np.unique(label, return_index=True, return_inverse=True)
     return np.asarray(np.argsort(np.argsort(first))[inverse])
+
+
+def bodies(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Find what hangs together over vertices.
+
+    Parameters
+    ----------
+    faces : (m, 3) int64
+
+    Returns
+    -------
+    (m,) int64
+        Body of each face, numbered from 0.
+
+    Examples
+    --------
+    >>> bodies(np.array([[0, 1, 2], [3, 4, 5], [2, 6, 7]])).tolist()
+    [0, 1, 0]
+    """
+    a, b, c = faces.T
+    count = int(faces.max()) + 1
+    graph = coo_matrix(
+        (np.ones(2 * len(a)), (np.concatenate([a, b]), np.concatenate([b, c]))), shape=(count, count)
+    )
+    _, body = np.unique(connected_components(graph, directed=False)[1][a], return_inverse=True)
+    return np.asarray(body)
 
 
 def boundary(faces: NDArray[np.int64]) -> NDArray[np.int64]:
