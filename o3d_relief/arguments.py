@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import NoReturn
 
 from o3d_relief import __version__
+from o3d_relief.errors import ParameterError
 from o3d_relief.params import ReliefParams, View
+from o3d_relief.plate_params import HANGINGS, LOOSE, PRINT_DIRECTIONS, SHAPES, PlateParams
 
-__all__ = ["chosen_params", "chosen_view", "parse"]
+__all__ = ["chosen_params", "chosen_plate", "chosen_view", "parse"]
 
 _POINTS = ("--front", "--up", "--viewpoint", "--vanishing-point")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$")
@@ -104,12 +106,18 @@ def _parser() -> argparse.ArgumentParser:
     make.add_argument("output", type=Path, metavar="OUTPUT", help="PLY, OBJ, STL or GLB file")
     _add_view(make)
     _add_params(make)
+    _add_plate(make)
     make.add_argument(
         "--report", type=Path, metavar="FILE.json", help="write parameters, counts, times and depths"
     )
     make.add_argument("--stages", type=Path, metavar="DIR", help="write a picture of each stage")
     make.add_argument(
-        "--strict", action="store_true", help="refuse a relief that does not keep what the certificate tests"
+        "--strict", action="store_true",
+        help="refuse a relief that does not keep what the certificate tests, and a solid that fails the "
+        "print checks; end with 3 where these only warn",
+    )  # fmt: skip
+    make.add_argument(
+        "--dry-run", action="store_true", help="only tell sizes, volume, triangles and memory in advance"
     )
 
     demo = commands.add_parser(
@@ -175,6 +183,65 @@ def _add_params(command: argparse.ArgumentParser) -> None:
     add("--alpha-min", type=float, metavar="A", help="smallest compression ratio (default: half of alpha)")
     add("--depth", type=float, metavar="D", help="exact depth in the input's unit, instead of alpha")
     add("--seed", type=int, default=default.seed, metavar="N", help="default: %(default)s")
+
+
+def _add_plate(command: argparse.ArgumentParser) -> None:
+    default = PlateParams()
+    group = command.add_argument_group(
+        "solid", "lengths in millimetres; any of these makes a closed body of relief and plate"
+    )
+    for name, text in (
+        ("width_mm", "width of the whole object"),
+        ("depth_mm", "depth of the whole object, base included (default: in proportion)"),
+        ("base_mm", "thickness of the plate"),
+        ("margin_mm", "from the relief to the frame or the plate's edge"),
+        ("frame_mm", "width of a rim around the plate"),
+        ("frame_height_mm", "height of the rim (default: its width)"),
+        ("embed_mm", "how far the relief reaches into the plate"),
+        ("thickness_mm", "thickness given to surfaces that have none"),
+        ("min_wall_mm", "report walls that are thinner"),
+        ("nozzle_mm", "width of the printer's line"),
+        ("magnet_mm", "diameter of the magnets"),
+        ("magnet_height_mm", "thickness of the magnets"),
+    ):
+        value = getattr(default, name)
+        group.add_argument(f"--{name.replace('_', '-')}", type=float, metavar="MM",
+                           help=text if value is None else f"{text} (default: {value:g})")  # fmt: skip
+    for name, choices, text in (
+        ("shape", SHAPES, "of the plate"),
+        ("hanging", HANGINGS, "in the plate's back"),
+        ("loose", LOOSE, "what becomes of parts that touch nothing"),
+        ("print_direction", PRINT_DIRECTIONS, "what is up in print: z for lying on the back"),
+    ):
+        group.add_argument(f"--{name.replace('_', '-')}", choices=choices,
+                           help=f"{text} (default: {getattr(default, name)})")  # fmt: skip
+    group.add_argument("--overhang-degrees", type=float, metavar="A",
+                       help=f"faces that lean out further need support "
+                            f"(default: {default.overhang_degrees:g})")  # fmt: skip
+    group.add_argument("--walls", type=Path, metavar="FILE.png", help="draw the wall thickness as heat")
+
+
+def chosen_plate(options: argparse.Namespace) -> PlateParams | None:
+    """Return the plate that was asked for, None where none was.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        Of the command "make".
+
+    Raises
+    ------
+    ParameterError
+        A value out of its range, or a depth that was asked for twice.
+    """
+    given = {name: getattr(options, name) for name in PlateParams.__dataclass_fields__}
+    given = {name: value for name, value in given.items() if value is not None}
+    if not given and options.walls is None:
+        return None
+    for name in ("alpha", "depth"):
+        if "depth_mm" in given and getattr(options, name) is not None:
+            raise ParameterError(f"--depth-mm and --{name} exclude each other: give one of them.")
+    return PlateParams(**given)
 
 
 def chosen_view(options: argparse.Namespace) -> View:

@@ -8,15 +8,18 @@ import signal
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from o3d_relief.arguments import chosen_params, chosen_view, parse
+from o3d_relief.arguments import chosen_params, chosen_plate, chosen_view, parse
 from o3d_relief.errors import FileError, MeshError, ReliefError
 from o3d_relief.files import check_exists, check_place, write_bytes
 from o3d_relief.params import ReliefParams
+from o3d_relief.plate_params import PlateParams
 
 if TYPE_CHECKING:
+    from o3d_relief.making import Made
     from o3d_relief.pipeline import Relief
     from o3d_relief.records import StageRecord
 
@@ -34,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        Exit code: 0, 2 for anything the user can mend, 130 when interrupted.
+        Exit code: 0, 2 for anything the user can mend, 3 for warnings with --strict, 130 when interrupted.
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
     signals: list[int] = []
@@ -47,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         options = parse(given)
-        {"make": _make, "demo": _demo}[options.command](options)
+        return {"make": _make, "demo": _demo}[options.command](options)
     except ReliefError as error:
         sys.stderr.write(f"o3d-relief: error: {error}\n")
         return 2
@@ -60,7 +63,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-    return 0
 
 
 def _tell(text: str) -> None:
@@ -73,31 +75,44 @@ def _tell_stage(record: StageRecord) -> None:
     _tell(f"  {record.name:<13}{record.seconds:6.2f} s  {counts}".rstrip())
 
 
-def _make(options: argparse.Namespace) -> None:
-    params, view = chosen_params(options), chosen_view(options)
+def _make(options: argparse.Namespace) -> int:
+    params, view, plate = chosen_params(options), chosen_view(options), chosen_plate(options)
     check_exists(options.input)
     _check_places(options)
 
+    from o3d_relief.making import make_checked, tell_estimate
     from o3d_relief.pipeline import make_relief
     from o3d_relief.scene.read import read_mesh
     from o3d_relief.scene.write import check_writable, write_mesh
+    from o3d_relief.solid.estimate import relief_depth
 
     check_writable(options.output)
     started = time.perf_counter()
     mesh = read_mesh(options.input)
     _tell(f"{options.input}: {len(mesh.vertices)} vertices, {len(mesh.triangles)} triangles")
     try:
+        if options.dry_run:
+            tell_estimate(mesh, params, view, plate or PlateParams(), _tell)
+            return 0
+        if plate is not None and plate.depth_mm is not None:
+            params = replace(params, depth=relief_depth(mesh, view, plate))
         relief = make_relief(mesh, params, view=view, on_stage=_tell_stage)
+        made = None if plate is None else make_checked(relief, plate, _tell)
     except MeshError as error:
         raise MeshError(f"{options.input}: {error}") from error
     if options.strict and relief.certificate.failures:
         raise ReliefError(f"{options.output} is not written (--strict): {relief.certificate.failures[0]}")
-    write_mesh(options.output, relief.mesh)
+    if options.strict and made is not None and made.report.failures:
+        raise ReliefError(f"{options.output} is not written (--strict): {made.report.failures[0]}")
+    write_mesh(options.output, relief.mesh if made is None else made.solid.to_open3d())
     if options.report is not None:
-        _write_report(options.report, relief)
+        _write_report(options.report, relief, made)
+    if options.walls is not None and made is not None:
+        made.draw_walls(options.walls)
     if options.stages is not None:
         _write_stages(options.stages, relief)
-    _tell_result(options.output, relief, time.perf_counter() - started)
+    _tell_result(options.output, relief, time.perf_counter() - started, solid=made is not None)
+    return 3 if options.strict and made is not None and made.report.verdict != "pass" else 0
 
 
 def _check_places(options: argparse.Namespace) -> None:
@@ -106,15 +121,18 @@ def _check_places(options: argparse.Namespace) -> None:
     taken = {options.input.resolve(): "the input", options.output.resolve(): "the output"}
     if len(taken) == 1:
         raise FileError(f"{options.output} is the input, which would be lost: choose another output.")
-    if options.report is not None:
-        check_place(options.report)
-        if options.report.resolve() in taken:
-            raise FileError(f"{options.report} is {taken[options.report.resolve()]}: choose another report.")
+    for name, path in (("report", options.report), ("picture", options.walls)):
+        if path is None:
+            continue
+        check_place(path)
+        if path.resolve() in taken:
+            raise FileError(f"{path} is {taken[path.resolve()]}: choose another {name}.")
+        taken[path.resolve()] = f"the {name}"
     if options.stages is not None and options.stages.exists() and not options.stages.is_dir():
         raise FileError(f"{options.stages} is a file, not a folder for pictures.")
 
 
-def _demo(options: argparse.Namespace) -> None:
+def _demo(options: argparse.Namespace) -> int:
     folder = options.directory
     _make_folder(folder)
 
@@ -139,6 +157,7 @@ def _demo(options: argparse.Namespace) -> None:
     save_png(folder / "sheet.png", view_sheet(in_relief_frame, relief.mesh))
     _tell_result(folder / "relief.ply", relief, time.perf_counter() - started)
     _tell(f"look at {folder / 'sheet.png'} and at the pictures in {folder / 'stages'}")
+    return 0
 
 
 def _make_folder(folder: Path) -> None:
@@ -148,8 +167,9 @@ def _make_folder(folder: Path) -> None:
         raise FileError(f"The folder {folder} cannot be made: {error.strerror}.") from error
 
 
-def _write_report(path: Path, relief: Relief) -> None:
-    write_bytes(path, (json.dumps(relief.report(), indent=2) + "\n").encode())
+def _write_report(path: Path, relief: Relief, made: Made | None = None) -> None:
+    values = relief.report() | ({} if made is None else made.values())
+    write_bytes(path, (json.dumps(values, indent=2) + "\n").encode())
 
 
 def _write_stages(folder: Path, relief: Relief) -> None:
@@ -162,7 +182,7 @@ def _write_stages(folder: Path, relief: Relief) -> None:
     )
 
 
-def _tell_result(path: Path, relief: Relief, seconds: float) -> None:
+def _tell_result(path: Path, relief: Relief, seconds: float, *, solid: bool = False) -> None:
     report = relief.summary()
     if relief.stages["compression"].counts.get("already_shallower"):
         _tell(
@@ -170,6 +190,9 @@ def _tell_result(path: Path, relief: Relief, seconds: float) -> None:
         )
     if left := relief.stages["order"].counts.get("left", 0):
         _tell(f"{left} pairs of surfaces could not be brought back into order; a smaller k may help")
+    if solid:
+        _tell(f"{path}: the solid, {seconds:.1f} s in all")
+        return
     _tell(
         f"{path}: {report['vertices']} vertices, {report['triangles']} triangles; "
         f"depth {report['scene_depth']:.4g} -> {report['relief_depth']:.4g}, {seconds:.1f} s in all"
