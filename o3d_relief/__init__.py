@@ -10,10 +10,14 @@ if TYPE_CHECKING:
     from o3d_relief.linalg.laplacian import cotangent_laplacian
     from o3d_relief.params import ReliefParams, View
     from o3d_relief.pipeline import Relief, make_relief
+    from o3d_relief.plate_params import PlateParams
     from o3d_relief.scene.demo import demo_scene
     from o3d_relief.scene.read import read_mesh
     from o3d_relief.scene.write import write_mesh
     from o3d_relief.show.render import render
+    from o3d_relief.solid.body import Solid
+    from o3d_relief.solid.checks import SolidReport, check_solid
+    from o3d_relief.solid.make import make_solid
 
 __version__ = "0.1.0"
 
@@ -21,14 +25,19 @@ __all__ = [
     "FileError",
     "MeshError",
     "ParameterError",
+    "PlateParams",
     "Relief",
     "ReliefError",
     "ReliefParams",
+    "Solid",
+    "SolidReport",
     "SolverError",
     "View",
+    "check_solid",
     "cotangent_laplacian",
     "demo_scene",
     "make_relief",
+    "make_solid",
     "read_mesh",
     "render",
     "write_mesh",
@@ -43,6 +52,11 @@ _HOME = {
     "ReliefParams": "params",
     "View": "params",
     "Relief": "pipeline",
+    "PlateParams": "plate_params",
+    "Solid": "solid.body",
+    "SolidReport": "solid.checks",
+    "check_solid": "solid.checks",
+    "make_solid": "solid.make",
     "make_relief": "pipeline",
     "cotangent_laplacian": "linalg.laplacian",
     "demo_scene": "scene.demo",
