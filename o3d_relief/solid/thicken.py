@@ -19,6 +19,8 @@ _CREASE = 0.77
 """Cosine of 40 degrees: charts end at sharper edges."""
 _CONE = 0.5
 """Cosine of 60 degrees: charts whose normals turn away further from their mean are split."""
+_FOLD = 0.4
+"""Cosine of 66 degrees between a vertex normal and its faces, half the angle of a fold."""
 _SHARE = 0.55
 """Share of the room up to the next wall that a wall may take: two of them then meet in the middle."""
 
@@ -42,13 +44,17 @@ def shells(piece: Piece, thickness: float) -> list[Piece]:
         Each without boundary.
     """
     chart = charts(piece)
-    room = room_behind(piece)
+    depth = np.minimum(thickness, _SHARE * room_behind(piece))
+    shared, sharpness = _offsets(piece)
     result = []
     order = np.argsort(chart, kind="stable")
     for rows in np.split(order, np.flatnonzero(np.diff(chart[order])) + 1):
-        result.append(
-            _shell(piece.only(rows), np.minimum(thickness, _SHARE * room[np.unique(piece.faces[rows])]))
-        )
+        part, used = piece.only(rows), np.unique(piece.faces[rows])
+        # Neighbouring charts go back in the same direction, so that nothing gapes between them, but where
+        # the surface folds so sharply that there is no such direction.
+        own, _ = _offsets(part)
+        offset = np.where(sharpness[used, None] < _FOLD, own, shared[used])
+        result.append(_shell(part, depth[used, None] * offset))
     return result
 
 
@@ -101,11 +107,32 @@ def room_behind(piece: Piece) -> NDArray[np.float64]:
     return np.asarray((hit + 1e-4) * size)
 
 
-def _shell(chart: Piece, thickness: NDArray[np.float64]) -> Piece:
+def _offsets(piece: Piece) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Find how far each vertex must move so that its faces move back by 1, as a mitre does.
+
+    Returns
+    -------
+    offset : (n, 3) float64
+        At most 1 / _FOLD long.
+    sharpness : (n,) float64
+        Least cosine between the vertex normal and the normals of its faces.
+    """
+    normals = _vertex_normals(piece)
+    face = piece.area_normals()
+    length = np.linalg.norm(face, axis=1)
+    whole = length > 0.0
+    unit = face[whole] / length[whole, None]
+    corners = piece.faces[whole]
+    cosine = np.ones(len(piece.vertices))
+    np.minimum.at(cosine, corners, (unit[:, None, :] * normals[corners]).sum(axis=2))
+    return -normals / np.maximum(cosine, _FOLD)[:, None], cosine
+
+
+def _shell(chart: Piece, offset: NDArray[np.float64]) -> Piece:
     """Close a chart with a copy of itself behind it and walls between."""
     count = len(chart.vertices)
     edges = boundary(chart.faces)
-    behind = chart.vertices - thickness[:, None] * _vertex_normals(chart)
+    behind = chart.vertices + offset
     (a, b), (c, d) = edges.T, (edges + count).T
     walls = np.concatenate([np.stack([b, a, c], axis=1), np.stack([b, c, d], axis=1)])
     return chart.with_copies(np.arange(count), behind).with_faces(chart.faces[:, ::-1] + count, walls)
