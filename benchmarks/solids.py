@@ -1,8 +1,8 @@
-"""Make a solid of every mesh of a folder: python benchmarks/solids.py [FOLDER] [--shapes S...] [--only NAME...].
+"""Make a solid of every mesh of a folder: python benchmarks/solids.py [FOLDER] [--shapes ...] [--only ...].
 
 FOLDER (default: the one that O3D_RELIEF_DATA names) may have a MANIFEST.tsv with the columns file, up and
-suggested_view_from. Each relief is made at the depth that is asked for, each solid read by trimesh, which took no
-part in making it. A line for each, tab-separated; the exit code is 1 if one is not as asked for.
+suggested_view_from. Each relief is made at the depth that is asked for, each solid measured by trimesh, which
+took no part in making it. A line for each, tab-separated; the exit code is 1 if one is not as asked for.
 """
 
 from __future__ import annotations
@@ -75,7 +75,8 @@ def row_of(name: str, solid: rel.Solid, params: rel.PlateParams, seconds: tuple[
     return [
         name, params.shape, str(len(mesh.faces)), str(mesh.is_watertight), str(mesh.is_winding_consistent),
         f"{mesh.volume / 1000:.1f}", " x ".join(f"{length:.2f}" for length in mesh.extents), f"{off:.1e}",
-        f"{back_off:.1e}", str(report.bodies), f"{report.overlap_share:.0e}", f"{report.thin_area_mm2:.0f}", *parts,
+        f"{back_off:.1e}", str(report.bodies), f"{report.overlap_share:.0e}",
+        f"{report.thin_area_mm2:.0f}", *parts,
         f"{seconds[0]:.1f}", f"{seconds[1]:.1f}", report.verdict if good else "FAIL",
     ]  # fmt: skip
 

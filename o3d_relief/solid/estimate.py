@@ -84,8 +84,7 @@ def estimate_solid(
         wanted = params.depth / unit * scale
         depth, known = min(depth, wanted), wanted <= depth
     covered, mean_height = _front(vertices, faces)
-    total_height = (plate.width_mm / width if plate.shape == "ellipse" else 1.0) * height
-    total_height += 0.0 if plate.shape == "ellipse" else 2.0 * plate.edge_mm
+    total_height = (plate.width_mm - 2.0 * plate.edge_mm) * height / width + 2.0 * plate.edge_mm
     share = {"rectangle": 1.0, "ellipse": np.pi / 4.0, "contour": covered, "none": 0.0}[plate.shape]
     volume = plate.width_mm * total_height * share * plate.back_mm
     volume += width * height * covered * mean_height * _FLATTENED * depth

@@ -139,15 +139,18 @@ def _shell(chart: Piece, offset: NDArray[np.float64]) -> Piece:
 
 
 def _vertex_normals(piece: Piece) -> NDArray[np.float64]:
-    """(n, 3) unit normals, weighted by area; +z where they cancel."""
+    """(n, 3) unit normals, each face weighted by its angle at the vertex; +z where they cancel."""
     count = len(piece.vertices)
+    corners = piece.vertices[piece.faces]
+    along = np.roll(corners, -1, axis=1) - corners
+    back = np.roll(corners, 1, axis=1) - corners
+    angle = np.arctan2(np.linalg.norm(np.cross(along, back), axis=2), (along * back).sum(axis=2))
     normals = piece.area_normals()
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = np.where(length > 0.0, normals / np.where(length > 0.0, length, 1.0), 0.0)
+    weighted = (angle[:, :, None] * normals[:, None, :]).reshape(-1, 3)
     total = np.stack(
-        [
-            np.bincount(piece.faces.ravel(), weights=np.repeat(along, 3), minlength=count)
-            for along in normals.T
-        ],
-        axis=1,
+        [np.bincount(piece.faces.ravel(), weights=axis, minlength=count) for axis in weighted.T], axis=1
     )
     length = np.linalg.norm(total, axis=1, keepdims=True)
     return np.where(length > 0.0, total / np.where(length > 0.0, length, 1.0), [0.0, 0.0, 1.0])

@@ -122,7 +122,7 @@ def test_spoilt_meshes_give_the_same_solid(spoil):
 
 def test_a_half_ball_that_is_open_at_its_back_is_capped():
     mesh = cut(ball(radius=20.0))
-    lifted = arrays(mesh.vertices + [0, 0, 10], mesh.faces)
+    lifted = arrays(mesh.vertices + np.array([0, 0, 10]), mesh.faces)
     solid, report = _made(lifted)
     assert solid.counts["parts_capped"] == 1
     assert report.bodies == 2
