@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import open3d as o3d
+from numpy.typing import NDArray
 
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.pipeline import Relief
@@ -91,14 +92,16 @@ def tell_estimate(
     tell(f"memory    about {found.memory_mb / 1000.0:.1f} GB")
 
 
-def wall_picture(solid: Solid, plate: PlateParams, *, size: tuple[int, int] = (700, 700)) -> Any:
-    """Draw how thick the walls are, from the front and from the side: what is too thin glows.
+def wall_picture(
+    solid: Solid, plate: PlateParams, *, size: tuple[int, int] = (700, 700)
+) -> NDArray[np.uint8]:
+    """Draw where the walls are too thin, from the front and from the side.
 
     Parameters
     ----------
     solid : Solid
     plate : PlateParams
-        Its `min_wall_mm` is in the middle of the scale.
+        What is thinner than its `min_wall_mm` is coloured by the millimetres that are missing.
     size : (width, height)
         Of each view, in pixels.
 
@@ -109,17 +112,24 @@ def wall_picture(solid: Solid, plate: PlateParams, *, size: tuple[int, int] = (7
     from o3d_relief.show.render import render, view_direction
     from o3d_relief.show.sheets import contact_sheet
 
-    walls = wall_thickness(solid)
-    thinnest = np.full(len(solid.vertices), np.inf)
-    np.minimum.at(thinnest, solid.faces.ravel(), np.repeat(walls, 3))
+    place, _, _, corners = solid.seam_split()
+    thinnest = np.full(len(place), np.inf)
+    np.minimum.at(thinnest, corners.ravel(), np.repeat(wall_thickness(solid), 3))
     mesh = o3d.geometry.TriangleMesh(
-        o3d.utility.Vector3dVector(np.array(solid.vertices)),
-        o3d.utility.Vector3iVector(solid.faces.astype(np.int32)),
+        o3d.utility.Vector3dVector(solid.vertices[place]),
+        o3d.utility.Vector3iVector(corners.astype(np.int32)),
     )
-    missing = np.maximum(0.0, 2.0 - thinnest / plate.min_wall_mm)
+    missing = np.maximum(0.0, plate.min_wall_mm - thinnest)
     pictures = [
-        render(mesh, direction=view_direction(yaw), size=size, field=missing, field_range=(0.0, 2.0),
-               field_label="walls", colormap="heat")
+        render(
+            mesh,
+            direction=view_direction(yaw),
+            size=size,
+            field=missing,
+            field_range=(0.0, plate.min_wall_mm),
+            field_label="mm too thin",
+            colormap="heat",
+        )
         for yaw in (0, 55)
-    ]  # fmt: skip
+    ]
     return contact_sheet(pictures, 2)

@@ -101,7 +101,7 @@ class Solid:
         """
         import open3d as o3d
 
-        place, rgb, _, corners = self._split()
+        place, rgb, _, corners = self.seam_split()
         if self.colors is None:
             place, corners = np.arange(len(self.vertices)), self.faces
         mesh = o3d.geometry.TriangleMesh(
@@ -125,11 +125,11 @@ class Solid:
         MeshError
             The mesh is not a manifold.
         """
-        place, rgb, plate, corners = self._split()
+        place, rgb, plate, corners = self.seam_split()
         twins = np.flatnonzero(place[1:] == place[:-1]) + 1
         return _build(np.column_stack([self.vertices[place], rgb, plate]), corners, twins, twins - 1)
 
-    def _split(
+    def seam_split(
         self,
     ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_], NDArray[np.int64]]:
         """Take the vertices of the seam twice: with the relief's and with the plate's colour.
