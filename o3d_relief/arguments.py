@@ -218,6 +218,8 @@ def _add_plate(command: argparse.ArgumentParser) -> None:
     group.add_argument("--overhang-degrees", type=float, metavar="A",
                        help=f"faces that lean out further need support "
                             f"(default: {default.overhang_degrees:g})")  # fmt: skip
+    group.add_argument("--thicken", action="store_const", const=True,
+                       help="make walls thinner than --min-wall-mm thicker, at their back")  # fmt: skip
     group.add_argument("--walls", type=Path, metavar="FILE.png", help="draw the wall thickness as heat")
 
 

@@ -15,9 +15,10 @@ from o3d_relief.params import ReliefParams, View
 from o3d_relief.pipeline import Relief
 from o3d_relief.plate_params import PlateParams
 from o3d_relief.solid.body import Solid
-from o3d_relief.solid.checks import SolidReport, check_solid, wall_thickness
+from o3d_relief.solid.checks import SolidReport, check_solid
 from o3d_relief.solid.estimate import estimate_solid
 from o3d_relief.solid.make import make_solid
+from o3d_relief.solid.measures import wall_thickness
 
 __all__ = ["Made", "make_checked", "tell_estimate", "wall_picture"]
 

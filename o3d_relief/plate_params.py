@@ -48,6 +48,8 @@ class PlateParams:
         Thickness given to surfaces that have none.
     min_wall_mm : float
         Walls thinner than this are reported.
+    thicken : bool
+        Also make them thicker, at their back. Sharp edges stay thinner.
     nozzle_mm : float
         Width of the line that the printer lays; no wall can be thinner.
     hanging : str
@@ -85,6 +87,7 @@ class PlateParams:
     embed_mm: float = 1.0
     thickness_mm: float = 1.2
     min_wall_mm: float = 0.8
+    thicken: bool = False
     nozzle_mm: float = 0.4
     hanging: str = "none"
     magnet_mm: float = 10.0
@@ -103,6 +106,8 @@ class PlateParams:
             value = getattr(self, name)
             if value not in choices:
                 raise ParameterError(f"{name} must be one of {', '.join(choices)}. Got {value!r} instead.")
+        if not isinstance(self.thicken, bool):
+            raise ParameterError(f"thicken must be True or False. Got {self.thicken!r} instead.")
         positive = ("width_mm", "depth_mm", "base_mm", "embed_mm", "thickness_mm", "min_wall_mm")
         for name in (*positive, "nozzle_mm", "magnet_mm", "magnet_height_mm", "frame_height_mm"):
             value = getattr(self, name)

@@ -31,6 +31,7 @@ def test_defaults_are_sensible():
         ({"embed_mm": 4}, "embed_mm must be less than base_mm, 4"),
         ({"shape": "heart"}, "shape must be one of rectangle, ellipse, contour, none"),
         ({"hanging": "nail"}, "hanging must be one of none, keyhole, magnets"),
+        ({"thicken": 1}, "thicken must be True or False"),
         ({"loose": "glue"}, "loose must be one of report, bridge, remove"),
         ({"print_direction": "up"}, "print_direction must be one of x, y, z"),
         ({"overhang_degrees": 100}, "overhang_degrees must be between 0 and 90"),

@@ -19,6 +19,7 @@ from o3d_relief.solid.pieces import Piece
 from o3d_relief.solid.plate import outline, plate, pockets
 from o3d_relief.solid.sizes import fitted, to_millimetres
 from o3d_relief.solid.surface_colors import surface_colors
+from o3d_relief.solid.walls import with_thicker_walls
 
 if TYPE_CHECKING:
     import manifold3d
@@ -75,6 +76,8 @@ def solid_of(mesh: MeshArrays, params: PlateParams) -> Solid:
         In any unit, cut at z = 0 exactly, seen from z+.
     params : PlateParams
     """
+    import manifold3d
+
     vertices, depth_ratio = to_millimetres(mesh.vertices, mesh.faces, params)
     colors = surface_colors(mesh)
     parts = closed_parts(vertices, mesh.faces, floor=-params.embed_mm, thickness=params.thickness_mm)
@@ -86,12 +89,14 @@ def solid_of(mesh: MeshArrays, params: PlateParams) -> Solid:
     lowest = 0.0 if params.shape == "none" else -(params.embed_mm + params.base_mm) / 2.0
     if body.bounding_box()[2] < lowest:
         body = body.trim_by_plane((0.0, 0.0, 1.0), lowest)
-    main = body
+    main, shape = body, manifold3d.CrossSection()
     if params.shape != "none":
         shape = outline(_silhouette(pieces, body, params), params)
         main = plate(shape, params) + body
-        if params.hanging != "none":
-            main -= pockets(shape, params)
+    if params.thicken:
+        main = with_thicker_walls(Solid.from_manifold(main, colored=colors is not None), params.min_wall_mm)
+    if params.hanging != "none":
+        main -= pockets(shape, params)
     whole, settled = joined(main, params)
     counts = {f"parts_{name}": count for name, count in parts.counts.items()}
     result = Solid.from_manifold(whole, colored=colors is not None)

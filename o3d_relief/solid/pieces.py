@@ -52,3 +52,20 @@ class Piece:
         """(m, 3) face normals as long as the faces' areas."""
         a, b, c = self.vertices[self.faces].transpose(1, 0, 2)
         return np.asarray(np.cross(b - a, c - a) / 2.0)
+
+    def normals(self) -> NDArray[np.float64]:
+        """(n, 3) unit normals, each face weighted by its angle at the vertex; +z where they cancel."""
+        count = len(self.vertices)
+        corners = self.vertices[self.faces]
+        along = np.roll(corners, -1, axis=1) - corners
+        back = np.roll(corners, 1, axis=1) - corners
+        angle = np.arctan2(np.linalg.norm(np.cross(along, back), axis=2), (along * back).sum(axis=2))
+        face = self.area_normals()
+        length = np.linalg.norm(face, axis=1, keepdims=True)
+        unit = np.where(length > 0.0, face / np.where(length > 0.0, length, 1.0), 0.0)
+        weighted = (angle[:, :, None] * unit[:, None, :]).reshape(-1, 3)
+        total = np.stack(
+            [np.bincount(self.faces.ravel(), weights=axis, minlength=count) for axis in weighted.T], axis=1
+        )
+        length = np.linalg.norm(total, axis=1, keepdims=True)
+        return np.where(length > 0.0, total / np.where(length > 0.0, length, 1.0), [0.0, 0.0, 1.0])

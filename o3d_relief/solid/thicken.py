@@ -25,7 +25,7 @@ _SHARE = 0.55
 """Share of the room up to the next wall that a wall may take: two of them then meet in the middle."""
 
 
-def shells(piece: Piece, thickness: float) -> list[Piece]:
+def shells(piece: Piece, thickness: float, *, leave_room: bool = True) -> list[Piece]:
     """Turn an open surface into closed ones of some thickness, which together are as thick as asked for.
 
     The surface itself stays in place and the thickness goes to its back. It is taken apart into charts
@@ -36,7 +36,9 @@ def shells(piece: Piece, thickness: float) -> list[Piece]:
     piece : Piece
         Faces turn to the side from which the surface is seen.
     thickness : float
-        In millimetres; less where a wall of the same piece lies closer behind.
+        In millimetres.
+    leave_room : bool
+        Less where a wall of the same piece lies closer behind.
 
     Returns
     -------
@@ -44,7 +46,9 @@ def shells(piece: Piece, thickness: float) -> list[Piece]:
         Each without boundary.
     """
     chart = charts(piece)
-    depth = np.minimum(thickness, _SHARE * room_behind(piece))
+    depth = np.full(len(piece.vertices), thickness)
+    if leave_room:
+        depth = np.minimum(depth, _SHARE * room_behind(piece))
     shared, sharpness = _offsets(piece)
     result = []
     order = np.argsort(chart, kind="stable")
@@ -99,7 +103,7 @@ def room_behind(piece: Piece) -> NDArray[np.float64]:
     (n,) float64
         In millimetres, infinite where there is none.
     """
-    normals = _vertex_normals(piece)
+    normals = piece.normals()
     scene, middle, size = unit_box(piece.vertices, piece.faces)
     start = (piece.vertices - middle) / size - 1e-4 * normals
     rays = np.concatenate([start, -normals], axis=1).astype(np.float32)
@@ -117,7 +121,7 @@ def _offsets(piece: Piece) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     sharpness : (n,) float64
         Least cosine between the vertex normal and the normals of its faces.
     """
-    normals = _vertex_normals(piece)
+    normals = piece.normals()
     face = piece.area_normals()
     length = np.linalg.norm(face, axis=1)
     whole = length > 0.0
@@ -136,24 +140,6 @@ def _shell(chart: Piece, offset: NDArray[np.float64]) -> Piece:
     (a, b), (c, d) = edges.T, (edges + count).T
     walls = np.concatenate([np.stack([b, a, c], axis=1), np.stack([b, c, d], axis=1)])
     return chart.with_copies(np.arange(count), behind).with_faces(chart.faces[:, ::-1] + count, walls)
-
-
-def _vertex_normals(piece: Piece) -> NDArray[np.float64]:
-    """(n, 3) unit normals, each face weighted by its angle at the vertex; +z where they cancel."""
-    count = len(piece.vertices)
-    corners = piece.vertices[piece.faces]
-    along = np.roll(corners, -1, axis=1) - corners
-    back = np.roll(corners, 1, axis=1) - corners
-    angle = np.arctan2(np.linalg.norm(np.cross(along, back), axis=2), (along * back).sum(axis=2))
-    normals = piece.area_normals()
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    normals = np.where(length > 0.0, normals / np.where(length > 0.0, length, 1.0), 0.0)
-    weighted = (angle[:, :, None] * normals[:, None, :]).reshape(-1, 3)
-    total = np.stack(
-        [np.bincount(piece.faces.ravel(), weights=axis, minlength=count) for axis in weighted.T], axis=1
-    )
-    length = np.linalg.norm(total, axis=1, keepdims=True)
-    return np.where(length > 0.0, total / np.where(length > 0.0, length, 1.0), [0.0, 0.0, 1.0])
 
 
 def _connected(pairs: NDArray[np.int64], count: int) -> NDArray[np.int64]:

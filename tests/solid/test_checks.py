@@ -4,7 +4,8 @@ import trimesh
 
 from o3d_relief.plate_params import PlateParams
 from o3d_relief.solid.body import Solid
-from o3d_relief.solid.checks import check_solid, wall_thickness
+from o3d_relief.solid.checks import check_solid
+from o3d_relief.solid.measures import wall_thickness
 
 
 def _solid(mesh, **counts):

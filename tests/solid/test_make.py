@@ -278,3 +278,19 @@ def test_a_relief_becomes_a_solid():
     again = rel.make_solid(relief, params)
     assert np.array_equal(again.vertices, solid.vertices)
     assert np.array_equal(again.faces, solid.faces)
+
+
+def test_thin_walls_are_made_thicker_at_their_back():
+    # A board that stands on two feet in front of the plate, 0.3 thick.
+    board = trimesh.creation.box(bounds=[[-20, -15, 10], [20, 15, 10.3]])
+    feet = [trimesh.creation.box(bounds=[[x - 2, -5, -3], [x + 2, 5, 10.1]]) for x in (-15, 15)]
+    mesh = cut(together(board, *feet))
+    thin, report = _made(mesh)
+    assert report.thin_area_mm2 == pytest.approx(2 * 40 * 30 - 2 * 2 * 4 * 10, rel=0.01)
+    thick, report = _made(mesh, thicken=True)
+    assert report.thin_area_mm2 < 1.0
+    assert report.bodies == 1
+    assert thick.volume - thin.volume == pytest.approx((0.8 * 1.02 - 0.3) * (40 * 30 - 2 * 4 * 10), rel=0.02)
+    assert thick.size == pytest.approx(thin.size)
+    board_front = thick.vertices[:, 2] == thick.vertices[:, 2].max()
+    assert np.ptp(thick.vertices[board_front, 0]) == pytest.approx(40.0)
