@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import open3d as o3d
 from numpy.typing import NDArray
 from PIL import Image
 
 import o3d_relief as rel
+from o3d_relief.making import wall_picture
 from o3d_relief.show.render import render, view_direction
 from o3d_relief.show.sheets import contact_sheet, stage_picture, view_sheet
+from o3d_relief.solid.estimate import relief_depth
 
 Picture = NDArray[np.uint8]
 
 PANEL = (460, 460)
+SMALL = (400, 400)
 
 
 def save(path: Path, picture: Picture) -> None:
@@ -38,6 +43,41 @@ def views(reliefs: dict[str, rel.Relief], yaw: float) -> Picture:
         for name, r in reliefs.items()
     ]
     return contact_sheet(pictures, len(pictures), titles=titles)
+
+
+def section(solid: rel.Solid, x: float) -> Picture:
+    """Cut a solid at an x and draw what lies right of it, the cut in red."""
+    half = solid.to_manifold().trim_by_plane((1.0, 0.0, 0.0), x).to_mesh64()
+    vertices = np.asarray(half.vert_properties)[:, :3]
+    faces = np.asarray(half.tri_verts).astype(np.int32)
+    cut = (np.abs(vertices[faces, 0] - x) < 1e-9).all(axis=1)
+    faces[cut] += len(vertices)
+    mesh = o3d.geometry.TriangleMesh(
+        o3d.utility.Vector3dVector(np.concatenate([vertices, vertices])), o3d.utility.Vector3iVector(faces)
+    )
+    colors = np.repeat([(0.83, 0.81, 0.78), (0.72, 0.22, 0.14)], len(vertices), axis=0)
+    return render(mesh, direction=view_direction(-62, 12), size=SMALL, colors=colors, sharp_colors=True)
+
+
+def solids(scene: o3d.geometry.TriangleMesh) -> Picture:
+    """Draw a solid on three plates, cut open, and from behind."""
+
+    def make(**values: Any) -> rel.Solid:
+        plate = rel.PlateParams(width_mm=150, depth_mm=32, base_mm=5, **values)
+        depth = relief_depth(scene, rel.View(), plate)
+        return rel.make_solid(rel.make_relief(scene, rel.ReliefParams(depth=depth)), plate)
+
+    plain, ellipse = make(), make(shape="ellipse", frame_mm=4.0, margin_mm=3.0)
+    contour = make(shape="contour", hanging="keyhole")
+    views = [(plain, 35, 12), (ellipse, 35, 12), (contour, 35, 12), (contour, 180, 0)]
+    pictures = [
+        render(solid.to_open3d(), direction=view_direction(yaw, pitch), size=SMALL)
+        for solid, yaw, pitch in views
+    ]
+    pictures.insert(3, section(plain, -14.0))
+    pictures.append(wall_picture(make(shape="contour"), rel.PlateParams(), size=SMALL)[:, : SMALL[0]])
+    titles = ["rectangle", "ellipse with a frame", "contour", "cut open", "keyhole", "walls under 0.8 mm"]
+    return contact_sheet(pictures, 3, titles=titles)
 
 
 def main() -> None:
@@ -66,6 +106,7 @@ def main() -> None:
     }
     save(folder / "alpha.jpg", views({name: make(**values) for name, values in ratios.items()}, 50))
     points = {"none": None, "g = (0, 0, -300)": (0.0, 0.0, -300.0), "g = (0, 0, -80)": (0.0, 0.0, -80.0)}
+    save(folder / "solid.jpg", solids(scene))
     perspectives = {name: make(view=rel.View(vanishing_point=g)) for name, g in points.items()}
     save(folder / "vanishing_point.jpg", views(perspectives, 0))
 
