@@ -152,6 +152,12 @@ class PlateParams:
                 f"base_mm must be less than depth_mm, {self.depth_mm:g}, the depth of the whole object. "
                 f"Got {self.base_mm:g} instead."
             )
+        frame = self.frame_mm if self.frame_height_mm is None else self.frame_height_mm
+        if self.frame_mm > 0.0 and self.depth_mm is not None and self.base_mm + frame > self.depth_mm:
+            raise ParameterError(
+                f"base_mm and frame_height_mm together, {self.base_mm + frame:g}, must not exceed depth_mm, "
+                f"{self.depth_mm:g}."
+            )
         if self.embed_mm >= self.base_mm:
             raise ParameterError(
                 f"embed_mm must be less than base_mm, {self.base_mm:g}. Got {self.embed_mm:g} instead."

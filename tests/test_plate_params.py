@@ -31,6 +31,10 @@ def test_defaults_are_sensible():
         ({"embed_mm": 4}, "embed_mm must be less than base_mm, 4"),
         ({"shape": "heart"}, "shape must be one of rectangle, ellipse, contour, none"),
         ({"hanging": "nail"}, "hanging must be one of none, keyhole, magnets"),
+        (
+            {"frame_mm": 12, "depth_mm": 15},
+            "base_mm and frame_height_mm together, 16, must not",
+        ),
         ({"thicken": 1}, "thicken must be True or False"),
         ({"loose": "glue"}, "loose must be one of report, bridge, remove"),
         ({"print_direction": "up"}, "print_direction must be one of x, y, z"),

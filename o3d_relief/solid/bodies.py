@@ -70,21 +70,22 @@ def _pins(
     radius = max(params.min_wall_mm, params.thickness_mm / 2.0)
     pins = []
     for body in loose:
-        start = _rear_points(body)
+        start, room = _rear_points(body)
         rays = np.column_stack([(start - middle) / size, np.tile([0.0, 0.0, -1.0], (len(start), 1))])
         gap = scene.cast_rays(o3d.core.Tensor(rays.astype(np.float32)))["t_hit"].numpy() * size
         best = int(gap.argmin())
         if not np.isfinite(gap[best]):
             continue
-        # A radius deep into both, so that the ends do not show.
-        length = float(gap[best]) + 2.0 * radius
+        # A radius deep into both, but never through the body: the ends do not show.
+        deep = min(radius, 0.9 * float(room[best]))
+        length = float(gap[best]) + radius + deep
         pin = manifold3d.Manifold.cylinder(length, radius, radius, 32)
-        pins.append(as_plate(pin.translate(tuple(start[best] + [0.0, 0.0, radius - length]))))
+        pins.append(as_plate(pin.translate(tuple(start[best] + [0.0, 0.0, deep - length]))))
     return pins
 
 
-def _rear_points(body: manifold3d.Manifold) -> NDArray[np.float64]:
-    """(q, 3) middles of the faces of a body that nothing of the body itself lies behind."""
+def _rear_points(body: manifold3d.Manifold) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Find the middles (q, 3) of the faces at the back of a body, and how thick it is before them, (q,)."""
     vertices, faces = _triangles(body)
     scene, middle, size = unit_box(vertices, faces)
     points = vertices[faces].mean(axis=1)
@@ -93,7 +94,11 @@ def _rear_points(body: manifold3d.Manifold) -> NDArray[np.float64]:
     start = (points - middle) / size - [0.0, 0.0, 1e-4]
     rays = np.column_stack([start, np.tile([0.0, 0.0, -1.0], (len(start), 1))])
     hidden = scene.test_occlusions(o3d.core.Tensor(rays.astype(np.float32))).numpy()
-    return np.asarray(points[~hidden] if (~hidden).any() else points)
+    points = points[~hidden] if (~hidden).any() else points
+    start = (points - middle) / size + [0.0, 0.0, 1e-5]
+    rays = np.column_stack([start, np.tile([0.0, 0.0, 1.0], (len(start), 1))])
+    room = scene.cast_rays(o3d.core.Tensor(rays.astype(np.float32)))["t_hit"].numpy() * size
+    return points, np.where(np.isfinite(room), room, 0.0)
 
 
 def _triangles(body: manifold3d.Manifold) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

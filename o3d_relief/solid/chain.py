@@ -14,7 +14,16 @@ from scipy.sparse.csgraph import connected_components
 
 from o3d_relief.scene.weld import first_of_equal_rows
 
-__all__ = ["bodies", "boundary", "edge_components", "loops", "one_of_each", "volume", "without_opposites"]
+__all__ = [
+    "bodies",
+    "boundary",
+    "edge_components",
+    "loops",
+    "one_of_each",
+    "separate_parts",
+    "volume",
+    "without_opposites",
+]
 
 
 def one_of_each(faces: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -78,6 +87,40 @@ def edge_components(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     size = count + int(edge.max(initial=-1)) + 1
     graph = coo_matrix((np.ones(len(edge)), (face, count + edge)), shape=(size, size))
     label = connected_components(graph, directed=False)[1][:count]
+    _, first, inverse = np.unique(label, return_index=True, return_inverse=True)
+    return np.asarray(np.argsort(np.argsort(first))[inverse])
+
+
+def separate_parts(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Find the parts of a mesh, and take those apart that only touch.
+
+    What hangs together over edges of two faces and has no boundary by itself is a part, even where more faces
+    meet at some of its edges: two boxes that share an edge are two parts.
+
+    Parameters
+    ----------
+    faces : (m, 3) int64
+
+    Returns
+    -------
+    (m,) int64
+        Part of each face, numbered from 0 in the order of their first faces.
+    """
+    directed, edge = _edges(faces)
+    face = np.repeat(np.arange(len(faces)), 3)
+    plain = np.bincount(edge)[edge] == 2
+    size = len(faces) + int(edge.max(initial=-1)) + 1
+    graph = coo_matrix((plain.astype(np.float64), (face, len(faces) + edge)), shape=(size, size))
+    graph.eliminate_zeros()
+    patch = connected_components(graph, directed=False)[1][: len(faces)]
+    side = edge * (int(patch.max(initial=0)) + 1) + patch[face]
+    _, place, inverse = np.unique(side, return_index=True, return_inverse=True)
+    net = np.bincount(inverse.reshape(-1), weights=np.where(directed[:, 0] < directed[:, 1], 1, -1))
+    is_open = np.zeros(int(patch.max(initial=0)) + 1, dtype=bool)
+    is_open[patch[face[place[net != 0.0]]]] = True
+    rest = np.flatnonzero(is_open[patch])
+    label = patch.astype(np.int64)
+    label[rest] = edge_components(faces[rest]) + len(is_open)
     _, first, inverse = np.unique(label, return_index=True, return_inverse=True)
     return np.asarray(np.argsort(np.argsort(first))[inverse])
 

@@ -22,7 +22,7 @@ _LINES = 256
 """Lines along x and along y that measure how high the scene stands."""
 _FLATTENED = 0.65
 """Heights in a relief over those in proportion: most of it comes closer to S; 0.45 to 0.8 measured."""
-_MEGABYTES, _BYTES_PER_TRIANGLE = 600.0, 3000.0
+_MEGABYTES, _BYTES_PER_TRIANGLE = 600.0, 1000.0
 """Peak memory, measured on scenes of 20,000 to 870,000 triangles."""
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +18,7 @@ from o3d_relief.solid.body import Solid, manifold_of
 from o3d_relief.solid.parts import closed_parts
 from o3d_relief.solid.pieces import Piece
 from o3d_relief.solid.plate import outline, plate, pockets
-from o3d_relief.solid.sizes import fitted, to_millimetres
+from o3d_relief.solid.sizes import fitted, shortfall, to_millimetres
 from o3d_relief.solid.surface_colors import surface_colors
 from o3d_relief.solid.walls import with_thicker_walls
 
@@ -25,6 +26,10 @@ if TYPE_CHECKING:
     import manifold3d
 
 __all__ = ["make_solid", "solid_of"]
+
+_ATTEMPTS = 3
+_EXACT = 1e-9
+"""Share of a length by which it may be off."""
 
 
 def make_solid(relief: Relief, params: PlateParams | None = None) -> Solid:
@@ -76,14 +81,32 @@ def solid_of(mesh: MeshArrays, params: PlateParams) -> Solid:
         In any unit, cut at z = 0 exactly, seen from z+.
     params : PlateParams
     """
-    import manifold3d
-
     vertices, depth_ratio = to_millimetres(mesh.vertices, mesh.faces, params)
     colors = surface_colors(mesh)
     parts = closed_parts(vertices, mesh.faces, floor=-params.embed_mm, thickness=params.thickness_mm)
     if not parts.pieces:
         raise MeshError("Nothing of the relief encloses a volume: there is nothing to print.")
-    pieces = fitted(parts.pieces, params)
+    # Once, but where what was furthest out turns out to be loose, or a crumb, and is left out.
+    wide = deep = 1.0
+    for _ in range(_ATTEMPTS):
+        pieces = fitted(parts.pieces, params, wide=wide, deep=deep)
+        whole, settled = joined(_on_plate(pieces, colors, params), params)
+        wider, deeper = shortfall(whole.bounding_box(), params)
+        if abs(wider - 1.0) < _EXACT and abs(deeper - 1.0) < _EXACT:
+            break
+        wide, deep = wide * wider, deep * deeper
+    depth_ratio *= deep / wide
+    result = Solid.from_manifold(whole, colored=colors is not None)
+    counts = {f"parts_{name}": count for name, count in parts.counts.items()}
+    return replace(result, counts={"depth_ratio": depth_ratio, **counts, **settled})
+
+
+def _on_plate(
+    pieces: Sequence[Piece], colors: NDArray[np.float64] | None, params: PlateParams
+) -> manifold3d.Manifold:
+    """Unite everything."""
+    import manifold3d
+
     body = _united(pieces, colors)
     # The back of a shell may reach further down than the plate is thick.
     lowest = 0.0 if params.shape == "none" else -(params.embed_mm + params.base_mm) / 2.0
@@ -95,18 +118,7 @@ def solid_of(mesh: MeshArrays, params: PlateParams) -> Solid:
         main = plate(shape, params) + body
     if params.thicken:
         main = with_thicker_walls(Solid.from_manifold(main, colored=colors is not None), params.min_wall_mm)
-    if params.hanging != "none":
-        main -= pockets(shape, params)
-    whole, settled = joined(main, params)
-    counts = {f"parts_{name}": count for name, count in parts.counts.items()}
-    result = Solid.from_manifold(whole, colored=colors is not None)
-    return Solid(
-        vertices=result.vertices,
-        faces=result.faces,
-        colors=result.colors,
-        is_plate=result.is_plate,
-        counts={"depth_ratio": depth_ratio, **counts, **settled},
-    )
+    return main if params.hanging == "none" else main - pockets(shape, params)
 
 
 def _united(pieces: Sequence[Piece], colors: NDArray[np.float64] | None) -> manifold3d.Manifold:

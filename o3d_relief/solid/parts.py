@@ -8,7 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o3d_relief.scene.weld import first_of_equal_rows
-from o3d_relief.solid.chain import boundary, edge_components, one_of_each, volume, without_opposites
+from o3d_relief.solid.chain import (
+    boundary,
+    edge_components,
+    one_of_each,
+    separate_parts,
+    volume,
+    without_opposites,
+)
 from o3d_relief.solid.closing import caps, lowered
 from o3d_relief.solid.orient import oriented
 from o3d_relief.solid.pieces import Piece
@@ -67,7 +74,7 @@ def closed_parts(
     edges = boundary(piece.faces)
     foot = (piece.vertices[edges, 2] == 0.0).all(axis=1)
     piece = lowered(piece, edges[foot], floor)
-    part = edge_components(piece.faces)
+    part = separate_parts(piece.faces)
     order = np.argsort(part, kind="stable")
     pieces: list[Piece] = []
     counts = {"closed": 0, "capped": 0, "to_the_plate": 0, "thickened": 0, "without_volume": 0}

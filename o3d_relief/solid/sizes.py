@@ -12,7 +12,7 @@ from o3d_relief.errors import MeshError
 from o3d_relief.plate_params import PlateParams
 from o3d_relief.solid.pieces import Piece
 
-__all__ = ["fitted", "scale_for", "to_millimetres"]
+__all__ = ["fitted", "scale_for", "shortfall", "to_millimetres"]
 
 
 def scale_for(points: NDArray[np.float64], params: PlateParams) -> float:
@@ -78,7 +78,34 @@ def to_millimetres(
     return np.asarray((vertices - middle) * [scale, scale, scale * ratio]), ratio
 
 
-def fitted(pieces: Sequence[Piece], params: PlateParams) -> list[Piece]:
+def shortfall(box: Sequence[float], params: PlateParams) -> tuple[float, float]:
+    """Return by how much a solid's relief must grow to have the size that was asked for.
+
+    Parameters
+    ----------
+    box : (6,) float
+        Least and greatest x, y, z of the solid.
+    params : PlateParams
+
+    Returns
+    -------
+    wider, deeper : float
+        Factors for x and y, and for z; 1 where the plate has that size or none was asked for.
+
+    Examples
+    --------
+    >>> shortfall((-40, -40, -4, 40, 40, 8), PlateParams(width_mm=80, depth_mm=16))
+    (1.0, 1.5)
+    """
+    wider = params.width_mm / (box[3] - box[0]) if params.shape == "none" else 1.0
+    if params.depth_mm is None or box[5] <= 0.0:
+        return wider, 1.0
+    return wider, (params.depth_mm - params.back_mm) / box[5]
+
+
+def fitted(
+    pieces: Sequence[Piece], params: PlateParams, *, wide: float = 1.0, deep: float = 1.0
+) -> list[Piece]:
     """Take back what thickness has added to the extents.
 
     Parameters
@@ -86,17 +113,20 @@ def fitted(pieces: Sequence[Piece], params: PlateParams) -> list[Piece]:
     pieces : sequence of Piece
         In millimetres.
     params : PlateParams
+    wide, deep : float
+        Further factors for x and y, and for z.
 
     Returns
     -------
     list of Piece
-        Centred; their extents are those asked for.
+        Centred; their extents are those asked for, times the factors.
     """
     used = np.concatenate([piece.vertices for piece in pieces])
     low, high = used.min(axis=0), used.max(axis=0)
     middle = np.array([(low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0, 0.0])
-    scale = scale_for(used[:, :2], params)
-    deep = 1.0 if params.depth_mm is None else (params.depth_mm - params.back_mm) / float(high[2])
+    scale = scale_for(used[:, :2], params) * wide
+    if params.depth_mm is not None:
+        deep *= (params.depth_mm - params.back_mm) / float(high[2])
     if np.abs(middle).max() == 0.0 and scale == deep == 1.0:
         return list(pieces)
     result = []

@@ -7,6 +7,7 @@ from o3d_relief.solid.chain import (
     edge_components,
     loops,
     one_of_each,
+    separate_parts,
     volume,
     without_opposites,
 )
@@ -65,3 +66,16 @@ def test_volume_of_a_box_anywhere():
     mesh = box(bounds=[[100, 200, 300], [102, 203, 304]])
     assert volume(np.array(mesh.vertices), np.array(mesh.faces)) == pytest.approx(24.0)
     assert volume(np.array(mesh.vertices), np.array(mesh.faces)[:, ::-1]) == pytest.approx(-24.0)
+
+
+def test_boxes_that_share_an_edge_are_two_parts():
+    from trimesh.creation import box
+    from trimesh.util import concatenate
+
+    mesh = concatenate([box(bounds=[[0, 0, 0], [1, 1, 1]]), box(bounds=[[1, 1, 0], [2, 2, 1]])])
+    mesh.merge_vertices()
+    faces = np.array(mesh.faces)
+    assert edge_components(faces).max() == 0
+    assert separate_parts(faces).tolist() == [0] * 12 + [1] * 12
+    assert separate_parts(faces[1:]).tolist() == [0] * 11 + [1] * 12  # the second is whole by itself
+    assert separate_parts(faces[1:-1]).max() == 0  # neither is

@@ -294,3 +294,27 @@ def test_thin_walls_are_made_thicker_at_their_back():
     assert thick.size == pytest.approx(thin.size)
     board_front = thick.vertices[:, 2] == thick.vertices[:, 2].max()
     assert np.ptp(thick.vertices[board_front, 0]) == pytest.approx(40.0)
+
+
+def test_the_depth_holds_where_the_highest_part_is_removed():
+    mesh = cut(together(ball((0, 0, -5), 10.0), ring((0, 0, 30))))
+    params = _params(mesh, depth_mm=20, loose="remove")
+    solid = solid_of(mesh, params)
+    assert solid.counts["loose_bodies"] == 1
+    assert solid.size[2] == pytest.approx(20.0, abs=1e-9)
+    assert check_solid(solid, params).failures == ()
+
+
+def test_pins_do_not_show():
+    plate = trimesh.creation.box(bounds=[[-10, -10, 20], [10, 10, 20.2]])  # thinner than the pin is wide
+    mesh = cut(together(plate, ball((0, 0, -5), 10.0)))
+    solid, report = _made(mesh, loose="bridge")
+    assert solid.counts["pins"] == 1
+    assert report.bodies == 1
+    assert solid.vertices[:, 2].max() == pytest.approx(20.2)
+
+
+def test_boxes_that_share_an_edge_and_overlap_others():
+    boxes = [([0, 0, 2], [10, 10, 12]), ([10, 10, 2], [20, 20, 12]), ([5, 5, 4], [15, 15, 14])]
+    solid, _ = _made(cut(together(*[trimesh.creation.box(bounds=bounds) for bounds in boxes])))
+    assert solid.volume == pytest.approx(32 * 32 * 4 + 3000 - 2 * 5 * 5 * 8, rel=1e-9)
