@@ -76,11 +76,12 @@ def _pins(
         best = int(gap.argmin())
         if not np.isfinite(gap[best]):
             continue
-        # A radius deep into both, but never through the body: the ends do not show.
-        deep = min(radius, 0.9 * float(room[best]))
-        length = float(gap[best]) + radius + deep
-        pin = manifold3d.Manifold.cylinder(length, radius, radius, 32)
-        pins.append(as_plate(pin.translate(tuple(start[best] + [0.0, 0.0, deep - length]))))
+        # A radius deep into both, but never through the body or the plate: the ends do not show.
+        x, y, z = start[best]
+        high = z + min(radius, 0.9 * float(room[best]))
+        low = max(z - float(gap[best]) - radius, -params.back_mm / 2.0)
+        pin = manifold3d.Manifold.cylinder(high - low, radius, radius, 32)
+        pins.append(as_plate(pin.translate((x, y, low))))
     return pins
 
 
