@@ -12,6 +12,7 @@ from scipy.ndimage import distance_transform_edt
 from o3d_relief.errors import ParameterError
 from o3d_relief.rays import unit_box
 from o3d_relief.solid.body import PLATE_COLOR, Solid
+from o3d_relief.solid.plate import as_plate
 
 __all__ = ["HeightField", "height_field", "solid_under"]
 
@@ -180,14 +181,12 @@ def solid_under(field: HeightField, solid: Solid) -> Solid:
     Solid
         Every line along z meets it once.
     """
-    from o3d_relief.solid.body import manifold_of
+    import manifold3d
 
-    highest = float(np.nanmax(field.z))
-    outline = solid.to_manifold().project()
-    bar = outline.extrude(highest - field.back + 1.0).translate([0.0, 0.0, field.back]).to_mesh64()
-    prism = manifold_of(
-        np.asarray(bar.vert_properties)[:, :3], np.asarray(bar.tri_verts).astype(np.int64), is_plate=True
-    )
+    thickness = float(np.nanmax(field.z)) - field.back + 1.0
+    shadow = solid.to_manifold().project().to_polygons()  # polygons that overlap
+    outline = manifold3d.CrossSection(shadow, manifold3d.FillRule.Positive)
+    prism = as_plate(outline.extrude(thickness).translate((0.0, 0.0, field.back)))
     # Colours are kept where they change; what is flat to a hundredth of a pixel needs no triangles.
     made = (_block(field).to_manifold() ^ prism).simplify(0.01 * field.mm_per_pixel)
     return Solid.from_manifold(made, colored=field.colors is not None)

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o3d_relief.errors import ParameterError
-from o3d_relief.solid.body import Solid, manifold_of
+from o3d_relief.solid.body import Solid
 from o3d_relief.solid.numerals import engraving
+from o3d_relief.solid.plate import as_plate
 from o3d_relief.workshop_params import TileParams
 
 if TYPE_CHECKING:
@@ -103,7 +104,7 @@ class _Pins:
         outline = [(0.0, start), (radius, start), (radius, end - tip), (radius - tip, end), (0.0, end)]
         standing = manifold3d.CrossSection([outline]).revolve(_SEGMENTS)  # along z
         turned = standing.rotate([0.0, 90.0, 0.0] if axis == 0 else [-90.0, 0.0, 0.0])
-        return _plain(turned.translate(place.tolist()))
+        return as_plate(turned.translate(place.tolist()))
 
 
 def make_tiles(solid: Solid, params: TileParams) -> Tiling:
@@ -168,7 +169,7 @@ def make_tiles(solid: Solid, params: TileParams) -> Tiling:
             if params.number:
                 carved = engraving(body, number, depth=_ENGRAVED)
                 unnumbered += carved is None
-                taken += [] if carved is None else [_plain(carved)]
+                taken += [] if carved is None else [as_plate(carved)]
             made = _united(_united(body, added, "Add"), taken, "Subtract")
             piece = Solid.from_manifold(made, colored=solid.colors is not None)
             tiles.append(
@@ -308,15 +309,7 @@ def _bar(
 def _box(low: NDArray[np.float64], high: NDArray[np.float64]) -> manifold3d.Manifold:
     import manifold3d
 
-    return _plain(manifold3d.Manifold.cube((high - low).tolist()).translate(low.tolist()))
-
-
-def _plain(part: manifold3d.Manifold) -> manifold3d.Manifold:
-    """Give a body without colours those of the plate, so that cuts with it have them, too."""
-    mesh = part.to_mesh64()
-    return manifold_of(
-        np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts).astype(np.int64), is_plate=True
-    )
+    return as_plate(manifold3d.Manifold.cube((high - low).tolist()).translate(low.tolist()))
 
 
 def _united(body: manifold3d.Manifold, parts: list[manifold3d.Manifold], how: str) -> manifold3d.Manifold:
