@@ -8,20 +8,18 @@ from pathlib import Path
 
 import numpy as np
 
-from o3d_relief.errors import FileError, MeshError
+from o3d_relief.errors import FileError
 from o3d_relief.files import check_place, write_files
 from o3d_relief.scene.arrays import MeshArrays
 from o3d_relief.scene.encode import encode_glb, encode_obj, encode_ply, encode_stl
 from o3d_relief.solid.body import PLATE_COLOR, Solid
+from o3d_relief.solid.distinct import distinct
 from o3d_relief.solid.threemf import encode_3mf
 
-__all__ = ["SOLID_WRITABLE", "check_solid_writable", "float32_solid", "write_solid", "write_solids"]
+__all__ = ["SOLID_WRITABLE", "check_solid_writable", "write_solid", "write_solids"]
 
 SOLID_WRITABLE = (".3mf", ".stl", ".ply", ".obj", ".glb")
 """The file endings that `write_solid` writes."""
-
-_COARSEST_MM = 0.005
-"""Vertices that float32 cannot tell apart are merged with a tolerance of at most this."""
 
 
 def check_solid_writable(path: str | Path) -> None:
@@ -49,8 +47,8 @@ def write_solid(path: str | Path, solid: Solid) -> None:
 
     3MF states its unit and keeps the colour of every corner. PLY, OBJ and GLB keep the colours of the
     vertices; a vertex where the colours of relief and plate meet is there twice. STL has no colours. GLB
-    is in metres, as the format demands. In 3MF, STL and GLB, which hold float32, no two vertices fall
-    together by rounding. The same solid gives the same bytes; the file appears whole or not at all.
+    is in metres, as the format demands. No two vertices lie at one place, whatever the format (see
+    `distinct`). The same solid gives the same bytes; the file appears whole or not at all.
 
     Parameters
     ----------
@@ -92,48 +90,9 @@ def write_solids(path: str | Path, solids: Mapping[str, Solid]) -> None:
     write_files(path, files)
 
 
-def float32_solid(solid: Solid) -> Solid:
-    """Return the solid, its vertices merged where float32 cannot tell them apart.
-
-    A file in float32 is read by position: where two vertices of it fall together, edges appear that have
-    more than two faces, and slicers start to repair.
-
-    Parameters
-    ----------
-    solid : Solid
-
-    Returns
-    -------
-    Solid
-        The same one where nothing falls together.
-
-    Raises
-    ------
-    MeshError
-        Vertices still fall together after everything finer than 0.005 mm is gone.
-    """
-    tolerance = 2.0 * float(np.spacing(np.float32(np.abs(solid.vertices).max())))
-    result = solid
-    while not _distinct(result):
-        if tolerance > _COARSEST_MM:
-            raise MeshError(
-                "The solid has detail that files in float32 cannot hold: make it smaller, or write PLY."
-            )
-        merged = solid.to_manifold().simplify(tolerance)
-        result = Solid.from_manifold(merged, colored=solid.colors is not None)
-        tolerance *= 4.0
-    return result
-
-
-def _distinct(solid: Solid) -> bool:
-    places = np.ascontiguousarray(solid.vertices.astype(np.float32) + np.float32(0.0))
-    return len(np.unique(places.view(np.dtype((np.void, 12))))) == len(places)
-
-
 def _encode(path: Path, solid: Solid) -> dict[str, bytes]:
     ending = path.suffix.lower()
-    if ending in (".3mf", ".stl", ".glb"):
-        solid = float32_solid(solid)
+    solid = distinct(solid)
     if ending == ".3mf":
         return {path.name: encode_3mf({path.stem: solid})}
     if ending == ".stl":

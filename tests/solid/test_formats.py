@@ -3,17 +3,16 @@ import xml.etree.ElementTree as ET
 import zipfile
 from io import BytesIO
 
-import manifold3d
 import numpy as np
 import pytest
 import trimesh
 
-from o3d_relief.errors import FileError, MeshError
+from o3d_relief.errors import FileError
 from o3d_relief.scene.read import read_mesh
-from o3d_relief.solid.body import PLATE_COLOR, Solid
-from o3d_relief.solid.formats import SOLID_WRITABLE, float32_solid, write_solid, write_solids
+from o3d_relief.solid.body import PLATE_COLOR
+from o3d_relief.solid.formats import SOLID_WRITABLE, write_solid, write_solids
 from o3d_relief.solid.threemf import encode_3mf
-from slabs import ball_on_slab, plain, plate, slab
+from slabs import ball_on_slab, slab
 
 CORE = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
 MATERIAL = "{http://schemas.microsoft.com/3dmanufacturing/material/2015/02}"
@@ -130,35 +129,6 @@ def test_the_same_solid_gives_the_same_bytes(tmp_path, ending):
 def test_zip_has_no_time_stamps():
     with zipfile.ZipFile(BytesIO(encode_3mf({"slab": slab()}))) as archive:
         assert {info.date_time for info in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
-
-
-def _needle(gap):
-    """A slab far from the origin, with a spike so thin that float32 cannot hold its sides."""
-    spike = manifold3d.Manifold.cube([gap, gap, 5.0]).translate([0.0, 0.0, -1.0])
-    made = (plate(base=2.0) + plain(spike)).translate([1000.0, 1000.0, 0.0])
-    return Solid.from_manifold(made, colored=False)
-
-
-def test_vertices_that_float32_cannot_tell_apart_are_merged():
-    fine = _needle(2e-5)
-    rounded = fine.vertices.astype(np.float32)
-    assert len(np.unique(rounded, axis=0)) < len(rounded)
-    merged = float32_solid(fine)
-    places = merged.vertices.astype(np.float32)
-    assert len(np.unique(places, axis=0)) == len(places)
-    assert merged.to_manifold().volume() == pytest.approx(fine.volume, rel=1e-6)
-
-
-def test_detail_that_no_tolerance_removes_is_an_error():
-    far = ball_on_slab()
-    moved = Solid(vertices=far.vertices + 1e9, faces=far.faces, is_plate=far.is_plate)
-    with pytest.raises(MeshError, match="float32"):
-        float32_solid(moved)
-
-
-def test_solid_without_such_detail_stays_as_it_is():
-    solid = ball_on_slab()
-    assert float32_solid(solid) is solid
 
 
 def test_other_endings_are_refused(tmp_path):
