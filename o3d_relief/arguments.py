@@ -13,6 +13,7 @@ from o3d_relief import __version__
 from o3d_relief.errors import ParameterError
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.plate_params import HANGINGS, LOOSE, PRINT_DIRECTIONS, SHAPES, PlateParams
+from o3d_relief.workshop_arguments import add_workshop, wants_workshop
 
 __all__ = ["chosen_params", "chosen_plate", "chosen_view", "parse"]
 
@@ -103,10 +104,11 @@ def _parser() -> argparse.ArgumentParser:
         "make", help="make a relief of a mesh file", description="Make a relief of a mesh file."
     )
     make.add_argument("input", type=Path, metavar="INPUT", help="PLY, OBJ, STL, OFF, GLB or glTF file")
-    make.add_argument("output", type=Path, metavar="OUTPUT", help="PLY, OBJ, STL or GLB file")
+    make.add_argument("output", type=Path, metavar="OUTPUT", help="PLY, OBJ, STL or GLB file; 3MF for solids")
     _add_view(make)
     _add_params(make)
     _add_plate(make)
+    add_workshop(make)
     make.add_argument(
         "--report", type=Path, metavar="FILE.json", help="write parameters, counts, times and depths"
     )
@@ -238,7 +240,7 @@ def chosen_plate(options: argparse.Namespace) -> PlateParams | None:
     """
     given = {name: getattr(options, name) for name in PlateParams.__dataclass_fields__}
     given = {name: value for name, value in given.items() if value is not None}
-    if not given and options.walls is None:
+    if not given and options.walls is None and not wants_workshop(options):
         return None
     for name in ("alpha", "depth"):
         if "depth_mm" in given and getattr(options, name) is not None:

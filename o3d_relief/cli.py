@@ -17,6 +17,7 @@ from o3d_relief.errors import FileError, MeshError, ReliefError
 from o3d_relief.files import check_exists, check_place, write_bytes
 from o3d_relief.params import ReliefParams
 from o3d_relief.plate_params import PlateParams
+from o3d_relief.workshop_arguments import check_workshop, chosen_mill, chosen_tiles
 
 if TYPE_CHECKING:
     from o3d_relief.making import Made
@@ -77,16 +78,19 @@ def _tell_stage(record: StageRecord) -> None:
 
 def _make(options: argparse.Namespace) -> int:
     params, view, plate = chosen_params(options), chosen_view(options), chosen_plate(options)
+    mill, tiles = chosen_mill(options), chosen_tiles(options)
+    check_workshop(plate, mill, tiles)
     check_exists(options.input)
-    _check_places(options)
+    taken = _check_places(options)
 
     from o3d_relief.making import make_checked, tell_estimate
     from o3d_relief.pipeline import make_relief
     from o3d_relief.scene.read import read_mesh
-    from o3d_relief.scene.write import check_writable, write_mesh
+    from o3d_relief.scene.write import write_mesh
     from o3d_relief.solid.estimate import relief_depth
+    from o3d_relief.workshop import write_work
 
-    check_writable(options.output)
+    _check_endings(options, solid=plate is not None)
     started = time.perf_counter()
     mesh = read_mesh(options.input)
     _tell(f"{options.input}: {len(mesh.vertices)} vertices, {len(mesh.triangles)} triangles")
@@ -97,14 +101,21 @@ def _make(options: argparse.Namespace) -> int:
         if plate is not None and plate.depth_mm is not None:
             params = replace(params, depth=relief_depth(mesh, view, plate))
         relief = make_relief(mesh, params, view=view, on_stage=_tell_stage)
-        made = None if plate is None else make_checked(relief, plate, _tell)
+        made = None
+        if plate is not None:
+            made = make_checked(
+                relief, plate, _tell, mill=mill, undercut_free=options.undercut_free, tiles=tiles
+            )
     except MeshError as error:
         raise MeshError(f"{options.input}: {error}") from error
     if options.strict and relief.certificate.failures:
         raise ReliefError(f"{options.output} is not written (--strict): {relief.certificate.failures[0]}")
     if options.strict and made is not None and made.report.failures:
         raise ReliefError(f"{options.output} is not written (--strict): {made.report.failures[0]}")
-    write_mesh(options.output, relief.mesh if made is None else made.solid.to_open3d())
+    if made is None:
+        write_mesh(options.output, relief.mesh)
+    else:
+        write_work(options.output, made.work, height_map=options.height_map, taken=taken)
     if options.report is not None:
         _write_report(options.report, relief, made)
     if options.walls is not None and made is not None:
@@ -115,13 +126,20 @@ def _make(options: argparse.Namespace) -> int:
     return 3 if options.strict and made is not None and made.report.verdict != "pass" else 0
 
 
-def _check_places(options: argparse.Namespace) -> None:
-    """Check before the long work that everything can be written, and nothing over something else."""
+def _check_places(options: argparse.Namespace) -> set[Path]:
+    """Check before the long work that everything can be written, and nothing over something else.
+
+    Returns the files that nothing else may replace.
+    """
     check_place(options.output)
     taken = {options.input.resolve(): "the input", options.output.resolve(): "the output"}
     if len(taken) == 1:
         raise FileError(f"{options.output} is the input, which would be lost: choose another output.")
-    for name, path in (("report", options.report), ("picture", options.walls)):
+    for name, path in (
+        ("report", options.report),
+        ("picture", options.walls),
+        ("height map", options.height_map),
+    ):
         if path is None:
             continue
         check_place(path)
@@ -130,6 +148,18 @@ def _check_places(options: argparse.Namespace) -> None:
         taken[path.resolve()] = f"the {name}"
     if options.stages is not None and options.stages.exists() and not options.stages.is_dir():
         raise FileError(f"{options.stages} is a file, not a folder for pictures.")
+    return set(taken)
+
+
+def _check_endings(options: argparse.Namespace, *, solid: bool) -> None:
+    """Check that there is a writer for each file."""
+    from o3d_relief.scene.write import check_writable
+    from o3d_relief.solid.formats import check_solid_writable
+    from o3d_relief.solid.heightmap import check_height_map
+
+    (check_solid_writable if solid else check_writable)(options.output)
+    if options.height_map is not None:
+        check_height_map(options.height_map)
 
 
 def _demo(options: argparse.Namespace) -> int:

@@ -19,6 +19,8 @@ from o3d_relief.solid.checks import SolidReport, check_solid
 from o3d_relief.solid.estimate import estimate_solid
 from o3d_relief.solid.make import make_solid
 from o3d_relief.solid.measures import wall_thickness
+from o3d_relief.workshop import Work, work_on
+from o3d_relief.workshop_params import MillParams, TileParams
 
 __all__ = ["Made", "make_checked", "tell_estimate", "wall_picture"]
 
@@ -32,10 +34,11 @@ class Made:
     solid: Solid
     plate: PlateParams
     report: SolidReport
+    work: Work
 
     def values(self) -> dict[str, Any]:
         """Return what the report file says of the solid."""
-        return {"plate": asdict(self.plate), "solid": self.report.values()}
+        return {"plate": asdict(self.plate), "solid": self.report.values(), **self.work.report()}
 
     def draw_walls(self, path: Path) -> None:
         """Write a picture of the wall thickness, see `wall_picture`."""
@@ -44,8 +47,16 @@ class Made:
         save_png(path, wall_picture(self.solid, self.plate))
 
 
-def make_checked(relief: Relief, plate: PlateParams, tell: Tell) -> Made:
-    """Make a solid, check it and tell what comes out.
+def make_checked(
+    relief: Relief,
+    plate: PlateParams,
+    tell: Tell,
+    *,
+    mill: MillParams | None = None,
+    undercut_free: bool = False,
+    tiles: TileParams | None = None,
+) -> Made:
+    """Make a solid, mill and cut it as far as asked for, check it and tell what comes out.
 
     Parameters
     ----------
@@ -53,21 +64,24 @@ def make_checked(relief: Relief, plate: PlateParams, tell: Tell) -> Made:
     plate : PlateParams
     tell : callable
         Takes a line.
+    mill, undercut_free, tiles
+        See `work_on`.
 
     Returns
     -------
     Made
     """
-    solid = make_solid(relief, plate)
+    work = work_on(make_solid(relief, plate), mill=mill, undercut_free=undercut_free, tiles=tiles)
+    solid = work.solid
     report = check_solid(solid, plate)
     x, y, z = report.size_mm
     tell(
         f"solid: {x:.2f} x {y:.2f} x {z:.2f} mm, {report.volume_mm3 / 1000.0:.1f} cm3, {report.triangles} "
         f"triangles; print checks: {report.verdict}"
     )
-    for sentence in (*report.failures, *report.warnings):
+    for sentence in (*report.failures, *report.warnings, *work.sentences()):
         tell(f"  {sentence}")
-    return Made(solid=solid, plate=plate, report=report)
+    return Made(solid=solid, plate=plate, report=report, work=work)
 
 
 def tell_estimate(

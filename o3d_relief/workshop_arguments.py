@@ -7,9 +7,10 @@ import re
 from pathlib import Path
 
 from o3d_relief.errors import ParameterError
+from o3d_relief.plate_params import PlateParams
 from o3d_relief.workshop_params import MillParams, TileParams
 
-__all__ = ["add_workshop", "chosen_mill", "chosen_tiles", "wants_workshop"]
+__all__ = ["add_workshop", "check_workshop", "chosen_mill", "chosen_tiles", "wants_workshop"]
 
 _SIZE = re.compile(r"([^xX]+)[xX]([^xX]+)$")
 
@@ -58,13 +59,14 @@ def add_workshop(command: argparse.ArgumentParser) -> None:
 
 
 def wants_workshop(options: argparse.Namespace) -> bool:
-    """Tell whether any of these options was given, for which the relief must become a solid.
+    """Tell whether anything was asked for that only a solid has: milling, tiles, a 3MF file.
 
     Parameters
     ----------
     options : argparse.Namespace
     """
-    return options.undercut_free or options.height_map is not None or options.tile is not None
+    wanted = options.undercut_free or options.height_map is not None or options.tile is not None
+    return bool(wanted or options.output.suffix.lower() == ".3mf")
 
 
 def chosen_mill(options: argparse.Namespace) -> MillParams | None:
@@ -122,3 +124,29 @@ def chosen_tiles(options: argparse.Namespace) -> TileParams | None:
         return None
     width, height = options.tile
     return TileParams(width_mm=width, height_mm=height, **given)
+
+
+def check_workshop(plate: PlateParams | None, mill: MillParams | None, tiles: TileParams | None) -> None:
+    """Check, before any long work, what does not depend on the relief.
+
+    Parameters
+    ----------
+    plate : PlateParams or None
+        None where no solid is made.
+    mill : MillParams or None
+    tiles : TileParams or None
+
+    Raises
+    ------
+    ParameterError
+        A tool wider than the piece, a plate too thin for the pins, tiles smaller than their pins.
+    """
+    if plate is None:
+        return
+    if mill is not None and mill.tool_mm >= plate.width_mm:
+        raise ParameterError(
+            f"tool_mm must be smaller than the piece, which is {plate.width_mm:g} mm wide. "
+            f"Got {mill.tool_mm:g} instead."
+        )
+    if tiles is not None:
+        tiles.pin_for(plate.back_mm)

@@ -8,7 +8,10 @@ from dataclasses import dataclass
 from o3d_relief.errors import ParameterError
 from o3d_relief.params import check_number, check_range
 
-__all__ = ["MillParams", "TileParams"]
+__all__ = ["PIN_WALL", "MillParams", "TileParams"]
+
+PIN_WALL = 0.6
+"""Millimetres of material that stay around the hole of a pin."""
 
 
 def _check_positive(name: str, value: object) -> float:
@@ -109,6 +112,26 @@ class TileParams:
             raise ParameterError(f"number must be True or False. Got {self.number!r} instead.")
         if self.pin_mm is not None:
             self.check_room(self.pin_mm, self.length_of(self.pin_mm))
+
+    def pin_for(self, base_mm: float) -> float:
+        """Return the diameter of the pins for a plate of this thickness (0 for none), in millimetres.
+
+        Raises
+        ------
+        ParameterError
+            A plate too thin for them, or a tile too small.
+        """
+        pin = self.pin_mm
+        if pin is None:
+            pin = min(6.0, base_mm / 2.0) if base_mm > 0.0 else 3.0
+        needed = pin + 2.0 * (self.clearance_mm + PIN_WALL)
+        if 0.0 < base_mm < needed - 1e-9:
+            raise ParameterError(
+                f"The plate must be at least {needed:g} mm thick for pins of {pin:g} mm. "
+                f"Got {base_mm:g} instead: make base_mm larger or pin_mm smaller."
+            )
+        self.check_room(pin, self.length_of(pin))
+        return pin
 
     def length_of(self, pin_mm: float) -> float:
         """Return how far a pin of this diameter stands out, in millimetres."""

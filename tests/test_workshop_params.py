@@ -60,3 +60,16 @@ def test_parameters_are_frozen_numbers(params):
 def test_pins_are_half_as_long_again_as_thick():
     assert TileParams(width_mm=200, height_mm=200).length_of(4.0) == 6.0
     assert TileParams(width_mm=200, height_mm=200, pin_length_mm=5).length_of(4.0) == 5.0
+
+
+@pytest.mark.parametrize(("base", "pin"), [(4.0, 2.0), (10.0, 5.0), (30.0, 6.0), (0.0, 3.0)])
+def test_pins_are_half_as_thick_as_the_plate(base, pin):
+    assert TileParams(width_mm=200, height_mm=200).pin_for(base) == pin
+
+
+def test_plates_too_thin_for_a_pin_are_refused():
+    tiles = TileParams(width_mm=200, height_mm=200)
+    with pytest.raises(ParameterError, match=r"at least 2\.6 mm thick for pins of 1 mm\. Got 2 instead"):
+        tiles.pin_for(2.0)
+    with pytest.raises(ParameterError, match=r"at least 5\.6 mm thick for pins of 4 mm\. Got 4 instead"):
+        TileParams(width_mm=200, height_mm=200, pin_mm=4).pin_for(4.0)

@@ -41,6 +41,8 @@ class HeightField:
         In millimetres.
     back : float
         z of the flat back.
+    highest : float
+        z of the highest point of the solid, which may lie between the pixels.
     """
 
     z: NDArray[np.float64]
@@ -50,6 +52,7 @@ class HeightField:
     left: float
     top: float
     back: float
+    highest: float
 
     def __post_init__(self) -> None:
         for item in fields(self):
@@ -141,6 +144,7 @@ def height_field(solid: Solid, mm_per_pixel: float) -> HeightField:
         left=float(left),
         top=float(top),
         back=float(low[2]),
+        highest=float(high[2]),
     )
 
 

@@ -16,7 +16,7 @@ from o3d_relief.errors import ParameterError
 from o3d_relief.solid.body import Solid
 from o3d_relief.solid.numerals import engraving
 from o3d_relief.solid.plate import as_plate
-from o3d_relief.workshop_params import TileParams
+from o3d_relief.workshop_params import PIN_WALL, TileParams
 
 if TYPE_CHECKING:
     import manifold3d
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 __all__ = ["Tile", "Tiling", "make_tiles"]
 
 _MOST_TILES = 400
-_WALL = 0.6
-"""Millimetres of material that stay around a hole."""
 _EVERY = 40.0
 """Millimetres of a joint for each pin."""
 _SEGMENTS = 32
@@ -91,7 +89,7 @@ class _Pins:
     @property
     def needed(self) -> float:
         """Half the width of the material that a hole needs."""
-        return self.radius + self.clearance + _WALL
+        return self.radius + self.clearance + PIN_WALL
 
     def bolt(self, place: NDArray[np.float64], axis: int, *, start: float, hole: bool) -> manifold3d.Manifold:
         """Return a pin at a place (3,) of a joint across an axis, or its hole, from `start` on."""
@@ -202,12 +200,9 @@ def _sizes(solid: Solid, params: TileParams) -> _Pins:
     """Choose the pins: half as thick as the plate, in the middle of it."""
     back = float(solid.vertices[:, 2].min())
     base = max(-back, 0.0)
-    diameter = params.pin_mm
-    if diameter is None:
-        diameter = min(6.0, base / 2.0) if base > 0.0 else 3.0
+    diameter = params.pin_for(base)
     length = params.length_of(diameter)
-    params.check_room(diameter, length)
-    least = diameter / 2.0 + params.clearance_mm + _WALL
+    least = diameter / 2.0 + params.clearance_mm + PIN_WALL
     return _Pins(
         radius=diameter / 2.0, length=length, clearance=params.clearance_mm, z=back + max(base / 2.0, least)
     )
@@ -247,7 +242,7 @@ def _free_places(
     whole: manifold3d.Manifold, axis: int, at: float, free: NDArray[np.float64], pins: _Pins
 ) -> NDArray[np.float64] | None:
     """Choose places along one joint where the material is whole; None where there is no material at all."""
-    half, reach = pins.needed, pins.length + pins.clearance + _WALL
+    half, reach = pins.needed, pins.length + pins.clearance + PIN_WALL
     low, high = np.zeros(3), np.zeros(3)
     low[axis], high[axis] = at - reach, at + reach
     low[1 - axis], high[1 - axis] = free

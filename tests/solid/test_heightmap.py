@@ -17,7 +17,13 @@ def field():
     z = np.linspace(0.0, 20.0, 40 * 60).reshape(40, 60)
     z[0, :5] = np.nan
     return HeightField(
-        z=z, is_plate=np.zeros(z.shape, dtype=bool), mm_per_pixel=0.3, left=-9.0, top=6.0, back=-4.0
+        z=z,
+        is_plate=np.zeros(z.shape, dtype=bool),
+        mm_per_pixel=0.3,
+        left=-9.0,
+        top=6.0,
+        back=-4.0,
+        highest=20.0,
     )
 
 

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -123,22 +125,47 @@ def test_milled_fields_have_nothing_that_the_tool_cannot_reach():
     np.testing.assert_allclose(ball_closing(made.z, 2.0, 0.5), made.z, atol=1e-12)
     steps = np.abs(np.diff(made.z, axis=1)).max()
     assert steps <= 0.5 / np.tan(np.radians(10.0)) + 1e-9
-    assert np.nanmax(made.z) == pytest.approx(18.0, abs=0.05)  # a ball of 10 is blunter than the tool
+    assert np.nanmax(made.z) == pytest.approx(field.highest, abs=1e-12)
+
+
+def test_a_blunted_tip_does_not_cost_depth():
+    field = height_field(slab(), 0.5)
+    x = (np.arange(120) - 60) * 0.5
+    cone = np.maximum(10.0 - 2.0 * np.hypot(x, x[20:100, None]), 0.0)
+    tip = replace(field.with_heights(cone), highest=10.0)
+    tool = MillParams(mm_per_pixel=0.5, tool_mm=1.0)
+    assert ball_opening(cone, 0.5, 0.5).max() < 9.6
+    made = milled(tip, tool).z
+    assert made.max() == pytest.approx(10.0, abs=1e-12)
+    assert (made[np.hypot(x, x[20:100, None]) > 6.0] == 0.0).all()
+
+
+def test_a_tip_that_is_lost_is_not_made_up_for():
+    field = height_field(slab(), 0.5)
+    needle = np.zeros((80, 120))
+    needle[40, 60] = 10.0
+    needle[10:30, 10:30] = 2.0
+    made = milled(
+        replace(field.with_heights(needle), highest=10.0), MillParams(mm_per_pixel=0.5, tool_mm=2.0)
+    )
+    assert made.z.max() == pytest.approx(2.0, abs=1e-9)
 
 
 def test_ridges_are_kept_on_request():
     field = height_field(slab(), 0.5)
     z = np.array(field.z)
     z[:, 60] = 5.0
-    ridge = field.with_heights(z)
+    ridge = replace(field.with_heights(z), highest=5.0)
     tool = {"mm_per_pixel": 0.5, "tool_mm": 4.0}
     assert milled(ridge, MillParams(**tool)).z.max() < 0.5
     assert (milled(ridge, MillParams(**tool, keep_ridges=True)).z[:, 60] == 5.0).all()
 
 
-def test_no_tool_and_no_draft_change_nothing():
+def test_no_tool_and_no_draft_only_mend_the_height_of_the_highest_pixel():
     field = height_field(ball_on_slab(), 0.5)
-    np.testing.assert_array_equal(milled(field, MillParams(mm_per_pixel=0.5)).z, field.z)
+    assert field.highest > np.nanmax(field.z)
+    np.testing.assert_allclose(milled(field, MillParams(mm_per_pixel=0.5)).z, field.z, atol=0.05)
+    assert np.nanmax(milled(field, MillParams(mm_per_pixel=0.5)).z) == pytest.approx(field.highest)
 
 
 def test_a_tool_larger_than_the_piece_is_refused():

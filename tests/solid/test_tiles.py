@@ -189,10 +189,20 @@ def test_tiles_without_a_plate_have_pins_where_there_is_material():
     ("values", "sentence"),
     [
         ({"width_mm": 6, "height_mm": 60}, "width_mm must be at least .* for pins of 2 mm"),
-        ({"width_mm": 60, "height_mm": 60, "pin_mm": 4}, "fit into none of the joints"),
+        ({"width_mm": 60, "height_mm": 60, "pin_mm": 4}, "at least 5.6 mm thick for pins of 4 mm"),
         ({"width_mm": 9.5, "height_mm": 9.5, "pin_mm": 0.5}, "must be larger: .* more than 400"),
     ],
 )
 def test_tiles_that_cannot_be(values, sentence):
     with pytest.raises(ParameterError, match=sentence):
         make_tiles(slab(400.0, 200.0), TileParams(**values))
+
+
+def test_pins_that_fit_nowhere_are_an_error():
+    # A plate that is hollow where the pins would lie.
+    hollow = plate(100.0, 40.0, 8.0) - plain(
+        manifold3d.Manifold.cube([96.0, 36.0, 3.0], True).translate([0.0, 0.0, -4.0])
+    )
+    solid = Solid.from_manifold(hollow, colored=False)
+    with pytest.raises(ParameterError, match="fit into none of the joints"):
+        make_tiles(solid, TileParams(width_mm=60, height_mm=60))
