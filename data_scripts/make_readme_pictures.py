@@ -80,6 +80,39 @@ def solids(scene: o3d.geometry.TriangleMesh) -> Picture:
     return contact_sheet(pictures, 3, titles=titles)
 
 
+def milling(solid: rel.Solid) -> Picture:
+    """Draw a solid, what a mill makes of it, and the height map."""
+    params = rel.MillParams(mm_per_pixel=0.2, tool_mm=3.0, draft_deg=3.0)
+    field = rel.milled(rel.height_field(solid, params.mm_per_pixel), params)
+    pictures = [
+        render(made.to_open3d(), direction=view_direction(35), size=PANEL, crease=30.0)
+        for made in (solid, rel.solid_under(field, solid))
+    ]
+    grey = Image.fromarray(
+        np.nan_to_num(255.0 * (field.z - field.back) / (field.highest - field.back)).astype(np.uint8)
+    )
+    sheet = Image.new("L", PANEL, 222)
+    grey.thumbnail((PANEL[0] - 40, PANEL[1] - 40))
+    sheet.paste(grey, tuple((all_of - mine) // 2 for all_of, mine in zip(PANEL, grey.size, strict=True)))
+    pictures.append(np.asarray(sheet.convert("RGB")))
+    return contact_sheet(pictures, 3, titles=["solid", "without undercuts, tool 3 mm", "height map"])
+
+
+def tiles(solid: rel.Solid) -> Picture:
+    """Draw tiles laid apart, from the front and from behind."""
+    apart = o3d.geometry.TriangleMesh()
+    for tile in rel.make_tiles(solid, rel.TileParams(width_mm=170, height_mm=170)).tiles:
+        apart += tile.solid.to_open3d().translate((18.0 * tile.column, -18.0 * tile.row, 0.0))
+    pictures = [
+        render(apart, direction=direction, light=light, size=PANEL, crease=30.0)
+        for direction, light in (
+            ((0.6, 0.35, 1.0), (-0.55, 0.65, 0.6)),
+            ((0.25, 0.2, -1.0), (0.8, 0.5, -0.3)),
+        )
+    ]
+    return contact_sheet(pictures, 2, titles=["tiles", "their backs"])
+
+
 def main() -> None:
     """Draw all pictures."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -109,6 +142,9 @@ def main() -> None:
     save(folder / "solid.jpg", solids(scene))
     perspectives = {name: make(view=rel.View(vanishing_point=g)) for name, g in points.items()}
     save(folder / "vanishing_point.jpg", views(perspectives, 0))
+    save(folder / "milling.jpg", milling(rel.make_solid(make(), rel.PlateParams(width_mm=150, depth_mm=29))))
+    large = rel.PlateParams(width_mm=260, depth_mm=48, base_mm=8)
+    save(folder / "tiles.jpg", tiles(rel.make_solid(make(), large)))
 
 
 if __name__ == "__main__":

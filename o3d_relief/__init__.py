@@ -17,13 +17,20 @@ if TYPE_CHECKING:
     from o3d_relief.show.render import render
     from o3d_relief.solid.body import Solid
     from o3d_relief.solid.checks import SolidReport, check_solid
+    from o3d_relief.solid.formats import write_solid
+    from o3d_relief.solid.heightmap import write_height_map
+    from o3d_relief.solid.heights import height_field, solid_under
     from o3d_relief.solid.make import make_solid
+    from o3d_relief.solid.milling import milled
+    from o3d_relief.solid.tiles import make_tiles
+    from o3d_relief.workshop_params import MillParams, TileParams
 
 __version__ = "0.1.0"
 
 __all__ = [
     "FileError",
     "MeshError",
+    "MillParams",
     "ParameterError",
     "PlateParams",
     "Relief",
@@ -32,15 +39,22 @@ __all__ = [
     "Solid",
     "SolidReport",
     "SolverError",
+    "TileParams",
     "View",
     "check_solid",
     "cotangent_laplacian",
     "demo_scene",
+    "height_field",
     "make_relief",
     "make_solid",
+    "make_tiles",
+    "milled",
     "read_mesh",
     "render",
+    "solid_under",
+    "write_height_map",
     "write_mesh",
+    "write_solid",
 ]
 
 _HOME = {
@@ -57,6 +71,14 @@ _HOME = {
     "SolidReport": "solid.checks",
     "check_solid": "solid.checks",
     "make_solid": "solid.make",
+    "make_tiles": "solid.tiles",
+    "height_field": "solid.heights",
+    "solid_under": "solid.heights",
+    "milled": "solid.milling",
+    "write_height_map": "solid.heightmap",
+    "write_solid": "solid.formats",
+    "MillParams": "workshop_params",
+    "TileParams": "workshop_params",
     "make_relief": "pipeline",
     "cotangent_laplacian": "linalg.laplacian",
     "demo_scene": "scene.demo",

@@ -6,6 +6,7 @@ import trimesh
 
 from o3d_relief.errors import ParameterError
 from o3d_relief.solid.body import PLATE_COLOR, Solid
+from o3d_relief.solid.fragments import held
 from o3d_relief.solid.numerals import engraving
 from o3d_relief.solid.tiles import make_tiles
 from o3d_relief.workshop_params import TileParams
@@ -206,3 +207,49 @@ def test_pins_that_fit_nowhere_are_an_error():
     solid = Solid.from_manifold(hollow, colored=False)
     with pytest.raises(ParameterError, match="fit into none of the joints"):
         make_tiles(solid, TileParams(width_mm=60, height_mm=60))
+
+
+def test_parts_without_hold_go_with_the_neighbour_that_holds_them():
+    # A hook that starts on the left half, crosses the joint at x = 0 above the plate and ends in the air.
+    post = plain(manifold3d.Manifold.cube([6.0, 6.0, 20.0]).translate([-10.0, -3.0, -2.0]))
+    arm = plain(manifold3d.Manifold.cube([25.0, 6.0, 4.0]).translate([-10.0, -3.0, 14.0]))
+    solid = Solid.from_manifold(plate(200.0, 60.0) + post + arm, colored=False)
+    tiling = make_tiles(solid, TileParams(width_mm=130, height_mm=80, **EXACT))
+    assert tiling.counts["loose"] == 0
+    assert [len(tile.solid.to_manifold().decompose()) for tile in tiling.tiles] == [1, 1]
+    np.testing.assert_allclose(tiling.tiles[0].solid.size, [115.0, 60.0, 22.0])
+    np.testing.assert_allclose(tiling.tiles[1].solid.size, [100.0, 60.0, 4.0])
+    assert sum(tile.solid.volume for tile in tiling.tiles) == pytest.approx(solid.volume, rel=1e-9)
+
+
+def test_loose_parts_that_would_make_a_tile_too_large_are_counted():
+    post = plain(manifold3d.Manifold.cube([6.0, 6.0, 20.0]).translate([-10.0, -3.0, -2.0]))
+    arm = plain(manifold3d.Manifold.cube([25.0, 6.0, 4.0]).translate([-10.0, -3.0, 14.0]))
+    solid = Solid.from_manifold(plate(200.0, 60.0) + post + arm, colored=False)
+    tiling = make_tiles(solid, TileParams(width_mm=110, height_mm=80, **EXACT))
+    assert tiling.counts["loose"] == 1
+    assert (tiling.tiles[0].solid.size[:2] <= [110.0, 80.0]).all()
+    assert sum(tile.solid.volume for tile in tiling.tiles) == pytest.approx(solid.volume, rel=1e-9)
+
+
+def test_parts_go_only_to_a_tile_that_has_room_for_them():
+    # An arm that starts on the left tile and passes over the one in the middle to the one on the right.
+    post = plain(manifold3d.Manifold.cube([6.0, 6.0, 20.0]).translate([-40.0, -3.0, -2.0]))
+    arm = plain(manifold3d.Manifold.cube([80.0, 6.0, 4.0]).translate([-40.0, -3.0, 14.0]))
+    solid = Solid.from_manifold(plate(180.0, 60.0) + post + arm, colored=False)
+    tiling = make_tiles(solid, TileParams(width_mm=78, height_mm=80, **EXACT))
+    assert tiling.counts["columns"] == 3
+    assert tiling.counts["loose"] == 2  # 60 mm for each tile: with 60 or 10 mm of arm they are too wide
+    whole, _ = held({(0, 0): solid.to_manifold()}, -4.0, (200.0, 200.0))
+    assert whole[0, 0].volume() == pytest.approx(solid.volume)
+    # Three tiles with room enough: the last piece hangs on the one in the middle.
+    cuts = [(-90.0, -30.0), (-30.0, 30.0), (30.0, 90.0)]
+    bodies = {
+        (i, 0): solid.to_manifold() ^ plain(manifold3d.Manifold.cube([60, 60, 40]).translate([x, -30, -10]))
+        for i, (x, _) in enumerate(cuts)
+    }
+    given, loose = held(bodies, -4.0, (200.0, 80.0))
+    assert loose == 0
+    assert [len(body.decompose()) for body in given.values()] == [1, 1, 1]
+    assert given[0, 0].bounding_box()[3] == 40.0
+    assert sum(body.volume() for body in given.values()) == pytest.approx(solid.volume, rel=1e-9)
