@@ -84,9 +84,7 @@ class Work:
             if counts["joints_without_pins"]:
                 told.append(f"{counts['joints_without_pins']} joints have no room for a pin: glue them")
             if counts["loose"]:
-                told.append(
-                    f"loose parts in tiles: {counts['loose']}; print them, too, and glue them where they belong"
-                )
+                told.append(f"{counts['loose']} loose parts lie in the tiles: glue them where they belong")
             if counts["unnumbered"]:
                 told.append(f"{counts['unnumbered']} tiles have no room for their number")
         return told
