@@ -191,8 +191,10 @@ def solid_under(field: HeightField, solid: Solid) -> Solid:
     shadow = solid.to_manifold().project().to_polygons()  # polygons that overlap
     outline = manifold3d.CrossSection(shadow, manifold3d.FillRule.Positive)
     prism = as_plate(outline.extrude(thickness).translate((0.0, 0.0, field.back)))
-    # Colours are kept where they change; what is flat to a hundredth of a pixel needs no triangles.
-    made = (_block(field).to_manifold() ^ prism).simplify(0.01 * field.mm_per_pixel)
+    made = _block(field).to_manifold() ^ prism
+    if field.colors is None:
+        # What is flat to a hundredth of a pixel needs no triangles; colours would be lost with them.
+        made = made.simplify(0.01 * field.mm_per_pixel)
     return Solid.from_manifold(made, colored=field.colors is not None)
 
 
