@@ -18,6 +18,7 @@ from o3d_relief.solid.body import Solid, manifold_of
 from o3d_relief.solid.parts import closed_parts
 from o3d_relief.solid.pieces import Piece
 from o3d_relief.solid.plate import outline, plate, pockets
+from o3d_relief.solid.refine import refined_for_texture
 from o3d_relief.solid.sizes import fitted, shortfall, to_millimetres
 from o3d_relief.solid.surface_colors import surface_colors
 from o3d_relief.solid.walls import with_thicker_walls
@@ -30,6 +31,8 @@ __all__ = ["make_solid", "solid_of"]
 _ATTEMPTS = 3
 _EXACT = 1e-9
 """Share of a length by which it may be off."""
+_COLOR_MM = 0.8
+"""Longest edge where a texture changes: colours of prints are not much finer."""
 
 
 def make_solid(relief: Relief, params: PlateParams | None = None) -> Solid:
@@ -81,6 +84,8 @@ def solid_of(mesh: MeshArrays, params: PlateParams) -> Solid:
         In any unit, cut at z = 0 exactly, seen from z+.
     params : PlateParams
     """
+    width = float(np.ptp(mesh.vertices[mesh.faces.ravel(), 0]))
+    mesh = refined_for_texture(mesh, _COLOR_MM * width / params.width_mm)
     vertices, depth_ratio = to_millimetres(mesh.vertices, mesh.faces, params)
     colors = surface_colors(mesh)
     parts = closed_parts(vertices, mesh.faces, floor=-params.embed_mm, thickness=params.thickness_mm)
