@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from o3d_relief.measure import ReliefQuality, Yardstick, measure_relief
     from o3d_relief.params import ReliefParams, View
     from o3d_relief.pipeline import Relief, make_relief
+    from o3d_relief.plate_params import PlateParams
     from o3d_relief.scan_params import ScanParams
     from o3d_relief.scene.demo import demo_scene
     from o3d_relief.scene.read import read_mesh, read_points
@@ -20,36 +21,58 @@ if TYPE_CHECKING:
     from o3d_relief.show.comparison import comparison_sheet
     from o3d_relief.show.render import render, save_png
     from o3d_relief.show.sheets import contact_sheet
+    from o3d_relief.solid.body import Solid
+    from o3d_relief.solid.checks import SolidReport, check_solid
+    from o3d_relief.solid.formats import write_solid
+    from o3d_relief.solid.heightmap import write_height_map
+    from o3d_relief.solid.heights import height_field, solid_under
+    from o3d_relief.solid.make import make_solid
+    from o3d_relief.solid.milling import milled
+    from o3d_relief.solid.tiles import make_tiles
+    from o3d_relief.workshop_params import MillParams, TileParams
 
 __version__ = "0.1.0"
 
 __all__ = [
     "FileError",
     "MeshError",
+    "MillParams",
     "ParameterError",
+    "PlateParams",
     "Relief",
     "ReliefError",
     "ReliefParams",
     "ReliefQuality",
     "Scan",
     "ScanParams",
+    "Solid",
+    "SolidReport",
     "SolverError",
+    "TileParams",
     "View",
     "Yardstick",
+    "check_solid",
     "comparison_sheet",
     "contact_sheet",
     "cotangent_laplacian",
     "demo_scene",
+    "height_field",
     "make_relief",
+    "make_solid",
+    "make_tiles",
     "measure_relief",
     "mesh_from_points",
+    "milled",
     "read_mesh",
     "read_points",
     "render",
     "save_png",
     "scan_points",
+    "solid_under",
     "view_direction",
+    "write_height_map",
     "write_mesh",
+    "write_solid",
 ]
 
 _HOME = {
@@ -61,6 +84,19 @@ _HOME = {
     "ReliefParams": "params",
     "View": "params",
     "Relief": "pipeline",
+    "PlateParams": "plate_params",
+    "Solid": "solid.body",
+    "SolidReport": "solid.checks",
+    "check_solid": "solid.checks",
+    "make_solid": "solid.make",
+    "make_tiles": "solid.tiles",
+    "height_field": "solid.heights",
+    "solid_under": "solid.heights",
+    "milled": "solid.milling",
+    "write_height_map": "solid.heightmap",
+    "write_solid": "solid.formats",
+    "MillParams": "workshop_params",
+    "TileParams": "workshop_params",
     "make_relief": "pipeline",
     "cotangent_laplacian": "linalg.laplacian",
     "ReliefQuality": "measure",

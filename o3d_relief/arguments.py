@@ -10,11 +10,14 @@ from pathlib import Path
 from typing import NoReturn
 
 from o3d_relief import __version__
+from o3d_relief.errors import ParameterError
 from o3d_relief.limits import MAX_TRIANGLES
 from o3d_relief.params import ReliefParams, View
-from o3d_relief.scan_params import ScanParams
+from o3d_relief.plate_params import HANGINGS, LOOSE, PRINT_DIRECTIONS, SHAPES, PlateParams
+from o3d_relief.scan_arguments import add_scan
+from o3d_relief.workshop_arguments import add_workshop, wants_workshop
 
-__all__ = ["chosen_params", "chosen_scan", "chosen_view", "parse"]
+__all__ = ["chosen_params", "chosen_plate", "chosen_view", "parse"]
 
 _POINTS = ("--front", "--up", "--viewpoint", "--vanishing-point", "--sensor")
 _FORMATS = "PLY, OBJ, STL, OFF, GLB, glTF, PCD, XYZ, PTS, LAS or LAZ"
@@ -106,17 +109,25 @@ def _parser() -> argparse.ArgumentParser:
         description="Make a relief of a mesh file, or of a point cloud, which is meshed first.",
     )
     make.add_argument("input", type=Path, metavar="INPUT", help=f"{_FORMATS} file")
-    make.add_argument("output", type=Path, metavar="OUTPUT", help="PLY, OBJ, STL or GLB file")
+    make.add_argument("output", type=Path, metavar="OUTPUT", help="PLY, OBJ, STL or GLB file; 3MF for solids")
     _add_view(make)
     _add_params(make)
-    _add_scan(make)
+    add_scan(make, _point)
+    _add_plate(make)
+    add_workshop(make)
     make.add_argument(
         "--report", type=Path, metavar="FILE.json", help="write parameters, counts, times and depths"
     )
     make.add_argument("--stages", type=Path, metavar="DIR", help="write a picture of each stage")
     make.add_argument(
-        "--strict", action="store_true", help="refuse a relief that does not keep what the certificate tests"
+        "--strict", action="store_true",
+        help="refuse a relief that does not keep what the certificate tests, and a solid that fails the "
+        "print checks; end with 3 where these only warn",
+    )  # fmt: skip
+    make.add_argument(
+        "--dry-run", action="store_true", help="only tell sizes, volume, triangles and memory in advance"
     )
+
     make.add_argument(
         "--max-triangles", type=int, metavar="N", help=f"refuse larger meshes (default: {MAX_TRIANGLES})"
     )
@@ -186,30 +197,46 @@ def _add_params(command: argparse.ArgumentParser) -> None:
     add("--seed", type=int, default=default.seed, metavar="N", help="default: %(default)s")
 
 
-def _add_scan(command: argparse.ArgumentParser) -> None:
-    default = ScanParams()
-    add = command.add_argument_group("point clouds", "lengths are in spacings of the points").add_argument
-    add("--sensor", type=_point, metavar="X Y Z",
-        help="where the scanner stood, in the file's frame (default: found out)")  # fmt: skip
-    add("--remove-ground", action="store_true", help="remove the floor or table under the object")
-    add("--no-file-normals", dest="file_normals", action="store_false",
-        help="estimate normals, even if the file has good ones")  # fmt: skip
-    add("--scan-depth", type=int, metavar="N",
-        help="depth of the Poisson octree (default: cells as wide as the spacing)")  # fmt: skip
-    add("--max-points", type=int, default=default.max_points, metavar="N",
-        help="thin larger clouds, to save memory (default: %(default)s)")  # fmt: skip
-    add("--outliers", type=float, default=default.outliers, metavar="D",
-        help="drop points so many standard deviations off, 0 for none (default: %(default)s)")  # fmt: skip
-    add("--max-hole", type=float, default=default.max_hole, metavar="W",
-        help="close holes up to this width (default: %(default)s)")  # fmt: skip
-    add("--min-part", type=float, default=default.min_part, metavar="S",
-        help="drop parts with a smaller share of the area of the largest (default: %(default)s)")  # fmt: skip
-    add("--scan-threads", type=int, default=default.threads, metavar="N",
-        help="more than one: results differ a little from run to run (default: %(default)s)")  # fmt: skip
+def _add_plate(command: argparse.ArgumentParser) -> None:
+    default = PlateParams()
+    group = command.add_argument_group(
+        "solid", "lengths in millimetres; any of these makes a closed body of relief and plate"
+    )
+    for name, text in (
+        ("width_mm", "width of the whole object"),
+        ("depth_mm", "depth of the whole object, base included (default: in proportion)"),
+        ("base_mm", "thickness of the plate"),
+        ("margin_mm", "from the relief to the frame or the plate's edge"),
+        ("frame_mm", "width of a rim around the plate"),
+        ("frame_height_mm", "height of the rim (default: its width)"),
+        ("embed_mm", "how far the relief reaches into the plate"),
+        ("thickness_mm", "thickness given to surfaces that have none"),
+        ("min_wall_mm", "report walls that are thinner"),
+        ("nozzle_mm", "width of the printer's line"),
+        ("magnet_mm", "diameter of the magnets"),
+        ("magnet_height_mm", "thickness of the magnets"),
+    ):
+        value = getattr(default, name)
+        group.add_argument(f"--{name.replace('_', '-')}", type=float, metavar="MM",
+                           help=text if value is None else f"{text} (default: {value:g})")  # fmt: skip
+    for name, choices, text in (
+        ("shape", SHAPES, "of the plate"),
+        ("hanging", HANGINGS, "in the plate's back"),
+        ("loose", LOOSE, "what becomes of parts that touch nothing"),
+        ("print_direction", PRINT_DIRECTIONS, "what is up in print: z for lying on the back"),
+    ):
+        group.add_argument(f"--{name.replace('_', '-')}", choices=choices,
+                           help=f"{text} (default: {getattr(default, name)})")  # fmt: skip
+    group.add_argument("--overhang-degrees", type=float, metavar="A",
+                       help=f"faces that lean out further need support "
+                            f"(default: {default.overhang_degrees:g})")  # fmt: skip
+    group.add_argument("--thicken", action="store_const", const=True,
+                       help="make walls thinner than --min-wall-mm thicker, at their back")  # fmt: skip
+    group.add_argument("--walls", type=Path, metavar="FILE.png", help="draw the wall thickness as heat")
 
 
-def chosen_scan(options: argparse.Namespace) -> ScanParams:
-    """Return how a point cloud is to be meshed.
+def chosen_plate(options: argparse.Namespace) -> PlateParams | None:
+    """Return the plate that was asked for, None where none was.
 
     Parameters
     ----------
@@ -219,20 +246,16 @@ def chosen_scan(options: argparse.Namespace) -> ScanParams:
     Raises
     ------
     ParameterError
-        A value out of its range.
+        A value out of its range, or a depth that was asked for twice.
     """
-    return ScanParams(
-        sensor=options.sensor,
-        remove_ground=options.remove_ground,
-        file_normals=options.file_normals,
-        depth=options.scan_depth,
-        max_points=options.max_points,
-        outliers=None if options.outliers == 0.0 else options.outliers,
-        max_hole=options.max_hole,
-        min_part=options.min_part,
-        threads=options.scan_threads,
-        seed=options.seed,
-    )
+    given = {name: getattr(options, name) for name in PlateParams.__dataclass_fields__}
+    given = {name: value for name, value in given.items() if value is not None}
+    if not given and options.walls is None and not wants_workshop(options):
+        return None
+    for name in ("alpha", "depth"):
+        if "depth_mm" in given and getattr(options, name) is not None:
+            raise ParameterError(f"--depth-mm and --{name} exclude each other: give one of them.")
+    return PlateParams(**given)
 
 
 def chosen_view(options: argparse.Namespace) -> View:

@@ -3,27 +3,16 @@
 from __future__ import annotations
 
 import argparse
-import json
 import signal
 import sys
 import time
 from collections.abc import Sequence
-from contextlib import suppress
-from dataclasses import replace
-from pathlib import Path
-from typing import TYPE_CHECKING
 
-from o3d_relief.arguments import chosen_params, chosen_scan, chosen_view, parse
-from o3d_relief.errors import FileError, MeshError, ParameterError, ReliefError
-from o3d_relief.files import check_exists, check_place, write_bytes
+from o3d_relief.arguments import parse
+from o3d_relief.console import make_folder, tell, tell_result, tell_stage, write_report, write_stages
+from o3d_relief.errors import ReliefError
+from o3d_relief.make_command import make
 from o3d_relief.params import ReliefParams
-from o3d_relief.scan_params import ScanParams
-
-if TYPE_CHECKING:
-    from open3d.geometry import PointCloud, TriangleMesh
-
-    from o3d_relief.pipeline import Relief
-    from o3d_relief.records import StageRecord
 
 __all__ = ["main"]
 
@@ -39,7 +28,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        Exit code: 0, 2 for anything the user can mend, 130 when interrupted.
+        Exit code: 0, 2 for anything the user can mend, 3 for warnings with --strict, 130 when interrupted.
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
     signals: list[int] = []
@@ -52,112 +41,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
     before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         options = parse(given)
-        {"make": _make, "demo": _demo}[options.command](options)
+        return {"make": make, "demo": _demo}[options.command](options)
     except ReliefError as error:
-        _tell(f"o3d-relief: error: {error}")
+        tell(f"o3d-relief: error: {error}")
         return 2
     except MemoryError:
-        _tell("o3d-relief: error: the memory is used up: reduce the mesh, or use a machine with more memory.")
+        tell("o3d-relief: error: the memory is used up: reduce the mesh, or use a machine with more memory.")
         return 2
     except (KeyboardInterrupt, ImportError):
         # An interrupted import of Open3D arrives as an ImportError.
         if not signals:
             raise
-        _tell("o3d-relief: interrupted; no file is left half-written.")
+        tell("o3d-relief: interrupted; no file is left half-written.")
         return 128 + signals[0]
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-    return 0
 
 
-def _tell(text: str) -> None:
-    if sys.stderr is None:  # closed when the program was started
-        return
-    # Where nobody reads on, the work still goes on.
-    with suppress(BrokenPipeError):
-        sys.stderr.write(text + "\n")
-        sys.stderr.flush()
-
-
-def _tell_stage(record: StageRecord) -> None:
-    counts = ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in record.counts.items() if count)
-    _tell(f"  {record.name:<13}{record.seconds:6.2f} s  {counts}".rstrip())
-
-
-def _make(options: argparse.Namespace) -> None:
-    params, view, scan = chosen_params(options), chosen_view(options), chosen_scan(options)
-    check_exists(options.input)
-    _check_places(options)
-
-    from o3d_relief.pipeline import make_relief
-    from o3d_relief.scene.write import check_writable, lost_attributes, write_mesh
-
-    check_writable(options.output)
-    started = time.perf_counter()
-    scene, meshing = _read(options.input, scan)
-    if meshing is None:
-        for note in lost_attributes(options.output, scene):
-            _tell(note)
-    try:
-        relief = make_relief(
-            scene, params, view=view, scan=meshing, on_stage=_tell_stage, max_triangles=options.max_triangles
-        )
-    except MeshError as error:
-        raise MeshError(f"{options.input}: {error}") from error
-    if options.strict and relief.certificate.failures:
-        raise ReliefError(f"{options.output} is not written (--strict): {relief.certificate.failures[0]}")
-    write_mesh(options.output, relief.mesh)
-    if options.report is not None:
-        _write_report(options.report, relief)
-    if options.stages is not None:
-        _write_stages(options.stages, relief)
-    _tell_result(options.output, relief, time.perf_counter() - started)
-
-
-def _read(path: Path, scan: ScanParams) -> tuple[TriangleMesh | PointCloud, ScanParams | None]:
-    """Read the scene and say what it is; return it and, for a point cloud, how to mesh it."""
-    from o3d_relief.scene.arrays import MeshArrays, to_open3d
-    from o3d_relief.scene.read import left_out, read_arrays
-
-    arrays = read_arrays(path)
-    if isinstance(arrays, MeshArrays):
-        _tell(f"{path}: {len(arrays.vertices)} vertices, {len(arrays.faces)} triangles")
-        for note in left_out(path, arrays):
-            _tell(note)
-        if scan != ScanParams(seed=scan.seed):
-            raise ParameterError(f"{path} is a mesh: the options for scans are for point clouds only.")
-        return to_open3d(arrays), None
-    carried = [
-        name
-        for name, there in (("colours", arrays.colors is not None), ("normals", arrays.normals is not None))
-        if there
-    ]
-    words = f", with {' and '.join(carried)}" if carried else ""
-    if arrays.sensor is not None and scan.sensor is None:
-        scan = replace(scan, sensor=arrays.sensor)
-        words += f", seen from {' '.join(f'{c:g}' for c in arrays.sensor)}"
-    _tell(f"{path}: a point cloud of {len(arrays.points)} points{words}; it is meshed first")
-    return arrays.to_open3d(), scan
-
-
-def _check_places(options: argparse.Namespace) -> None:
-    """Check before the long work that everything can be written, and nothing over something else."""
-    check_place(options.output)
-    taken = {options.input.resolve(): "the input", options.output.resolve(): "the output"}
-    if len(taken) == 1:
-        raise FileError(f"{options.output} is the input, which would be lost: choose another output.")
-    if options.report is not None:
-        check_place(options.report)
-        if options.report.resolve() in taken:
-            raise FileError(f"{options.report} is {taken[options.report.resolve()]}: choose another report.")
-    if options.stages is not None and options.stages.exists() and not options.stages.is_dir():
-        raise FileError(f"{options.stages} is a file, not a folder for pictures.")
-
-
-def _demo(options: argparse.Namespace) -> None:
+def _demo(options: argparse.Namespace) -> int:
     folder = options.directory
-    _make_folder(folder)
+    make_folder(folder)
 
     import numpy as np
 
@@ -169,49 +73,15 @@ def _demo(options: argparse.Namespace) -> None:
 
     started = time.perf_counter()
     scene = demo_scene()
-    _tell(f"built-in scene: {len(scene.vertices)} vertices, {len(scene.triangles)} triangles")
-    relief = make_relief(scene, ReliefParams(alpha=0.8), on_stage=_tell_stage)
+    tell(f"built-in scene: {len(scene.vertices)} vertices, {len(scene.triangles)} triangles")
+    relief = make_relief(scene, ReliefParams(alpha=0.8), on_stage=tell_stage)
     write_mesh(folder / "scene.ply", scene)
     write_mesh(folder / "relief.ply", relief.mesh)
     write_mesh(folder / "relief.glb", relief.mesh)
-    _write_report(folder / "report.json", relief)
-    _write_stages(folder / "stages", relief)
+    write_report(folder / "report.json", relief)
+    write_stages(folder / "stages", relief)
     in_relief_frame = scene.transform(np.linalg.inv(relief.to_scene))
     save_png(folder / "sheet.png", view_sheet(in_relief_frame, relief.mesh))
-    _tell_result(folder / "relief.ply", relief, time.perf_counter() - started)
-    _tell(f"look at {folder / 'sheet.png'} and at the pictures in {folder / 'stages'}")
-
-
-def _make_folder(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FileError(f"The folder {folder} cannot be made: {error.strerror}.") from error
-
-
-def _write_report(path: Path, relief: Relief) -> None:
-    write_bytes(path, (json.dumps(relief.report(), indent=2) + "\n").encode())
-
-
-def _write_stages(folder: Path, relief: Relief) -> None:
-    from o3d_relief.show.sheets import save_stage_pictures
-
-    _make_folder(folder)
-    _tell(f"drawing {len(relief.stages)} stage pictures, a few seconds each")
-    save_stage_pictures(
-        relief.stages, folder, relief=relief.mesh, on_picture=lambda picture: _tell(f"  {picture}")
-    )
-
-
-def _tell_result(path: Path, relief: Relief, seconds: float) -> None:
-    report = relief.summary()
-    if relief.stages["compression"].counts.get("already_shallower"):
-        _tell(
-            f"the relief is {report['relief_depth']:.4g} deep, less than was asked for: it is not stretched"
-        )
-    if left := relief.stages["order"].counts.get("left", 0):
-        _tell(f"{left} pairs of surfaces could not be brought back into order; a smaller k may help")
-    _tell(
-        f"{path}: {report['vertices']} vertices, {report['triangles']} triangles; "
-        f"depth {report['scene_depth']:.4g} -> {report['relief_depth']:.4g}, {seconds:.1f} s in all"
-    )
+    tell_result(folder / "relief.ply", relief, time.perf_counter() - started)
+    tell(f"look at {folder / 'sheet.png'} and at the pictures in {folder / 'stages'}")
+    return 0

@@ -16,7 +16,7 @@ _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 Triple = tuple[float, float, float]
 
 
-def _check_number(name: str, value: object) -> float:
+def check_number(name: str, value: object) -> float:
     if isinstance(value, bool | str) or type(value).__name__ == "bool":  # numpy's bool, too
         raise ParameterError(f"{name} must be a number. Got {value!r} instead.")
     try:
@@ -28,8 +28,8 @@ def _check_number(name: str, value: object) -> float:
     return number
 
 
-def _check_range(name: str, value: object, low: float, high: float = math.inf) -> float:
-    number = _check_number(name, value)
+def check_range(name: str, value: object, low: float, high: float = math.inf) -> float:
+    number = check_number(name, value)
     if not low <= number <= high:
         wanted = f"at least {low:g}" if high > 1e6 else f"between {low:g} and {high:g}"
         raise ParameterError(f"{name} must be {wanted}. Got {value!r} instead.")
@@ -37,10 +37,10 @@ def _check_range(name: str, value: object, low: float, high: float = math.inf) -
 
 
 def _check_integer(name: str, value: object, low: int, high: int) -> int:
-    number = _check_number(name, value)
+    number = check_number(name, value)
     if number != int(number):
         raise ParameterError(f"{name} must be a whole number. Got {value!r} instead.")
-    return int(_check_range(name, int(number), low, high))
+    return int(check_range(name, int(number), low, high))
 
 
 def _check_triple(name: str, value: object) -> Triple:
@@ -50,7 +50,7 @@ def _check_triple(name: str, value: object) -> Triple:
         items = ()
     if len(items) != 3:
         raise ParameterError(f"{name} must be three numbers. Got {value!r} instead.")
-    x, y, z = (_check_number(name, item) for item in items)
+    x, y, z = (check_number(name, item) for item in items)
     return (x, y, z)
 
 
@@ -78,12 +78,12 @@ def _words(direction: Triple) -> str:
 
 def _check_beta(value: float | Sequence[float]) -> float | tuple[float, ...]:
     if isinstance(value, int | float | str):
-        return _check_range("beta", value, 0.0)
+        return check_range("beta", value, 0.0)
     try:
         items = tuple(value)
     except TypeError:  # one number of another kind
-        return _check_range("beta", value, 0.0)
-    return tuple(_check_range("beta", item, 0.0) for item in items)
+        return check_range("beta", value, 0.0)
+    return tuple(check_range("beta", item, 0.0) for item in items)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -236,7 +236,7 @@ class ReliefParams:
         set_field(self, "k", _check_integer("k", self.k, 1, 2**31 - 1))
         set_field(self, "beta", _check_beta(self.beta))
         for name in ("discard_above", "attach_below", "max_order_error", "blend"):
-            set_field(self, name, _check_range(name, getattr(self, name), 0.0, 1.0))
+            set_field(self, name, check_range(name, getattr(self, name), 0.0, 1.0))
         if self.attach_below > self.discard_above:
             raise ParameterError(
                 "attach_below must not exceed discard_above. "
@@ -245,7 +245,7 @@ class ReliefParams:
         for name in ("smooth_points", "in_front", "in_order"):
             if not isinstance(getattr(self, name), bool):
                 raise ParameterError(f"{name} must be True or False. Got {getattr(self, name)!r} instead.")
-        set_field(self, "min_gap", _check_range("min_gap", self.min_gap, 0.0))
+        set_field(self, "min_gap", check_range("min_gap", self.min_gap, 0.0))
         if self.min_gap > 0.0 and not self.in_order:
             raise ParameterError("min_gap needs in_order: a gap cannot be kept where the order is not.")
         set_field(self, "seed", _check_integer("seed", self.seed, 0, 2**32 - 1))
@@ -258,7 +258,7 @@ class ReliefParams:
             value = getattr(self, name)
             if value is None:
                 continue
-            number = _check_number(name, value)
+            number = check_number(name, value)
             if number <= 0.0 or (name != "depth" and number > 1.0):
                 wanted = "greater than 0" if name == "depth" else "greater than 0 and at most 1"
                 raise ParameterError(f"{name} must be {wanted}. Got {value!r} instead.")

@@ -9,8 +9,9 @@ import numpy as np
 import open3d as o3d
 import pytest
 
-from o3d_relief.arguments import chosen_scan, parse
+from o3d_relief.arguments import parse
 from o3d_relief.cli import main
+from o3d_relief.scan_arguments import chosen_scan
 from o3d_relief.scene.read import read_mesh
 from o3d_relief.scene.write import write_mesh
 from shapes import bust, grid, hills, to_mesh
@@ -320,3 +321,63 @@ def test_demo(tmp_path):
     names = _files(tmp_path / "demo")
     assert {"sheet.png", "relief.ply", "relief.glb", "scene.ply", "report.json"} <= set(names)
     assert sum(name.startswith("stages/") for name in names) == 10
+
+
+def test_a_solid_in_millimetres(tmp_path, scene, capsys):
+    out, report = tmp_path / "solid.stl", tmp_path / "report.json"
+    words = ["--width-mm", "90", "--depth-mm", "15", "--shape", "ellipse", "--report", str(report)]
+    assert main(["make", str(scene), str(out), "-k", "16", *words]) == 0
+    size = np.ptp(np.asarray(read_mesh(out).vertices), axis=0)
+    assert size[[0, 2]] == pytest.approx([90, 15], abs=1e-4)
+    values = json.loads(report.read_text())
+    assert values["solid"]["watertight"] is True
+    assert values["solid"]["verdict"] in ("pass", "warnings")
+    assert values["plate"]["shape"] == "ellipse"
+    assert values["solid"]["counts"]["depth_ratio"] == pytest.approx(1.0, abs=0.05)
+    assert "solid: 90.00 x" in capsys.readouterr().err
+
+
+def test_strict_tells_warnings_from_failures(tmp_path, scene, capsys, monkeypatch):
+    words = ["make", str(scene), str(tmp_path / "s.ply"), "-k", "8", "--strict", "--width-mm", "90"]
+    assert main(words) == 0
+    assert main([*words, "--depth-mm", "200"]) == 3
+    assert _files(tmp_path) == ["s.ply", "scene.ply"]
+    (tmp_path / "s.ply").unlink()
+    monkeypatch.setattr("o3d_relief.solid.checks._SIZE_TOLERANCE", -1.0)
+    assert "is not written (--strict): The solid is 90.000 mm wide" in _fails(capsys, *words)
+    assert _files(tmp_path) == ["scene.ply"]
+
+
+def test_dry_run_writes_nothing(tmp_path, scene, capsys):
+    out = tmp_path / "solid.stl"
+    assert main(["make", str(scene), str(out), "--dry-run", "--width-mm", "90", "--depth-mm", "15"]) == 0
+    told = capsys.readouterr().err
+    assert "size      90.00 x" in told
+    assert "x 15.00 mm" in told
+    assert "volume    about" in told
+    assert "memory    about" in told
+    assert main(["make", str(scene), str(out), "--dry-run"]) == 0
+    assert "at most" in capsys.readouterr().err
+    assert _files(tmp_path) == ["scene.ply"]
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["--width-mm", "0"], "width_mm must be greater than 0"),
+        (["--width-mm", "90", "--depth-mm", "4"], "base_mm must be less than depth_mm, 4"),
+        (["--depth-mm", "20", "--depth", "3"], "--depth-mm and --depth exclude each other"),
+        (["--depth-mm", "20", "--alpha", "0.5"], "--depth-mm and --alpha exclude each other"),
+        (["--walls", "missing/w.png"], "folder missing is missing"),
+    ],
+)
+def test_wrong_sizes_write_nothing(tmp_path, scene, capsys, words, sentence):
+    assert sentence in _fails(capsys, "make", scene, tmp_path / "r.ply", *words)
+    assert _files(tmp_path) == ["scene.ply"]
+
+
+@pytest.mark.slow
+def test_a_picture_of_the_walls(tmp_path, scene):
+    out = tmp_path / "walls.png"
+    assert main(["make", str(scene), str(tmp_path / "r.ply"), "-k", "16", "--walls", str(out)]) == 0
+    assert out.read_bytes()[:4] == b"\x89PNG"

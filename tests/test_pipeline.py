@@ -418,7 +418,7 @@ def _with_value(value):
         (_broken(lambda v, f: (v, np.vstack([f, [0, 1, -1]]))), "names vertex -1"),
         (_broken(lambda v, f: (v * [0, 1, 1], f)), "edge-on"),
         (_broken(lambda v, f: (v, f[:, [0, 0, 1]])), "three different corners"),
-        (o3d.geometry.PointCloud(), "TriangleMesh"),
+        (o3d.geometry.PointCloud(), "no points"),
         (None, "TriangleMesh"),
     ],
 )

@@ -94,7 +94,7 @@ def trim_behind(
     uncut = np.flatnonzero(whole_face & ~behind)
     straddling = np.flatnonzero(whole_face & behind & in_front)
 
-    pieces, piece_from, edges = _cut_faces(faces[straddling], face_side[straddling], len(vertices))
+    pieces, piece_from, edges = _cut_faces(faces[straddling], face_side[straddling], vertices[:, 2])
     all_faces = np.concatenate([faces[uncut], pieces])
     face_from = np.concatenate([uncut, straddling[piece_from]])
     order = np.argsort(face_from, kind="stable")
@@ -123,20 +123,21 @@ def trim_behind(
 
 
 def _cut_faces(
-    faces: NDArray[np.int64], side: NDArray[np.int64], first_number: int
+    faces: NDArray[np.int64], side: NDArray[np.int64], height: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Cut straddling faces into the pieces in front.
 
     Returns
     -------
     pieces : (q, 3) int64
-        Faces over input vertices and, from `first_number` on, cut vertices.
+        Faces over input vertices and, from n_in on, cut vertices.
     piece_from : (q,) int64
         Row of `faces` that each piece is a part of.
     edges : (c, 2) int64
         Input vertices of each cut edge, the one in front first: the cut of an edge is the same seen from
         both its faces, and on both sides of a seam.
     """
+    first_number = len(height)
     # Walk around each face: a corner that is not behind stays, an edge that crosses gives a cut vertex.
     following = np.roll(faces, -1, axis=1)
     crosses = side * np.roll(side, -1, axis=1) < 0
@@ -152,5 +153,11 @@ def _cut_faces(
     count = (walk >= 0).sum(axis=1)
     triangle = np.flatnonzero(count >= 3)
     quad = np.flatnonzero(count == 4)
+    # A quadrilateral is cut from its higher kept corner: the same way on both sides of a two-sided sheet.
+    corners = compact[quad, :4]
+    z = np.append(height, np.full(len(edges), -np.inf))[corners]
+    highest = z == z.max(axis=1, keepdims=True)
+    start = np.where(highest, corners, first_number + len(edges)).argmin(axis=1)
+    compact[quad, :4] = np.take_along_axis(corners, (start[:, None] + np.arange(4)) % 4, axis=1)
     pieces = np.concatenate([compact[triangle][:, [0, 1, 2]], compact[quad][:, [0, 2, 3]]])
     return pieces, np.concatenate([triangle, quad]), edges.reshape(-1, 2)

@@ -1,0 +1,76 @@
+"""What the commands write: lines for the user, reports, pictures."""
+
+from __future__ import annotations
+
+import json
+import sys
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from o3d_relief.errors import FileError
+from o3d_relief.files import write_bytes
+
+if TYPE_CHECKING:
+    from o3d_relief.making import Made
+    from o3d_relief.pipeline import Relief
+    from o3d_relief.records import StageRecord
+
+__all__ = ["make_folder", "tell", "tell_result", "tell_stage", "write_report", "write_stages"]
+
+
+def tell(text: str) -> None:
+    """Write a line for the user."""
+    if sys.stderr is None:  # closed when the program was started
+        return
+    # Where nobody reads on, the work still goes on.
+    with suppress(BrokenPipeError):
+        sys.stderr.write(text + "\n")
+        sys.stderr.flush()
+
+
+def tell_stage(record: StageRecord) -> None:
+    """Write a line about a stage."""
+    counts = ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in record.counts.items() if count)
+    tell(f"  {record.name:<13}{record.seconds:6.2f} s  {counts}".rstrip())
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder; FileError where that is not possible."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(f"The folder {folder} cannot be made: {error.strerror}.") from error
+
+
+def write_report(path: Path, relief: Relief, made: Made | None = None) -> None:
+    """Write the report of a relief, and of the solid made of it."""
+    values = relief.report() | ({} if made is None else made.values())
+    write_bytes(path, (json.dumps(values, indent=2) + "\n").encode())
+
+
+def write_stages(folder: Path, relief: Relief) -> None:
+    """Write a picture of each stage into a folder."""
+    from o3d_relief.show.sheets import save_stage_pictures
+
+    make_folder(folder)
+    tell(f"drawing {len(relief.stages)} stage pictures, a few seconds each")
+    save_stage_pictures(
+        relief.stages, folder, relief=relief.mesh, on_picture=lambda picture: tell(f"  {picture}")
+    )
+
+
+def tell_result(path: Path, relief: Relief, seconds: float, *, solid: bool = False) -> None:
+    """Write what came out."""
+    report = relief.summary()
+    if relief.stages["compression"].counts.get("already_shallower"):
+        tell(f"the relief is {report['relief_depth']:.4g} deep, less than was asked for: it is not stretched")
+    if left := relief.stages["order"].counts.get("left", 0):
+        tell(f"{left} pairs of surfaces could not be brought back into order; a smaller k may help")
+    if solid:
+        tell(f"{path}: the solid, {seconds:.1f} s in all")
+        return
+    tell(
+        f"{path}: {report['vertices']} vertices, {report['triangles']} triangles; "
+        f"depth {report['scene_depth']:.4g} -> {report['relief_depth']:.4g}, {seconds:.1f} s in all"
+    )

@@ -1,0 +1,166 @@
+"""The command o3d-relief make."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from o3d_relief.arguments import chosen_params, chosen_plate, chosen_view
+from o3d_relief.console import tell, tell_result, tell_stage, write_report, write_stages
+from o3d_relief.errors import FileError, MeshError, ParameterError, ReliefError
+from o3d_relief.files import check_exists, check_place
+from o3d_relief.plate_params import PlateParams
+from o3d_relief.scan_arguments import chosen_scan
+from o3d_relief.scan_params import ScanParams
+from o3d_relief.workshop_arguments import check_workshop, chosen_mill, chosen_tiles
+
+if TYPE_CHECKING:
+    from open3d.geometry import PointCloud, TriangleMesh
+
+    from o3d_relief.making import Made
+    from o3d_relief.pipeline import Relief
+
+__all__ = ["make"]
+
+
+def make(options: argparse.Namespace) -> int:
+    """Run the command "make".
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+
+    Returns
+    -------
+    int
+        Exit code: 0, or 3 for a solid with warnings where --strict is given.
+
+    Raises
+    ------
+    ReliefError
+        Anything that the user can mend.
+    """
+    params, view, plate = chosen_params(options), chosen_view(options), chosen_plate(options)
+    mill, tiles, scan = chosen_mill(options), chosen_tiles(options), chosen_scan(options)
+    check_workshop(plate, mill, tiles)
+    check_exists(options.input)
+    taken = _check_places(options)
+
+    from o3d_relief.making import make_checked, tell_estimate
+    from o3d_relief.pipeline import make_relief
+    from o3d_relief.scene.scan import scan_points
+    from o3d_relief.scene.write import lost_attributes
+    from o3d_relief.solid.estimate import relief_depth
+
+    _check_endings(options, solid=plate is not None)
+    started = time.perf_counter()
+    scene, meshing = _read(options.input, scan)
+    if meshing is None and plate is None:
+        for note in lost_attributes(options.output, scene):
+            tell(note)
+    try:
+        if meshing is not None and (options.dry_run or plate is not None):
+            # Its size must be known before the relief is made.
+            scene, meshing = scan_points(scene, meshing, view=view, on_stage=tell_stage).mesh, None
+        if options.dry_run:
+            tell_estimate(scene, params, view, plate or PlateParams(), tell)
+            return 0
+        if plate is not None and plate.depth_mm is not None:
+            params = replace(params, depth=relief_depth(scene, view, plate))
+        relief = make_relief(
+            scene, params, view=view, scan=meshing, on_stage=tell_stage, max_triangles=options.max_triangles
+        )
+        made = None
+        if plate is not None:
+            free = options.undercut_free
+            made = make_checked(relief, plate, tell, mill=mill, undercut_free=free, tiles=tiles)
+    except MeshError as error:
+        raise MeshError(f"{options.input}: {error}") from error
+    _write(options, relief, made, taken)
+    tell_result(options.output, relief, time.perf_counter() - started, solid=made is not None)
+    return 3 if options.strict and made is not None and made.report.verdict != "pass" else 0
+
+
+def _write(options: argparse.Namespace, relief: Relief, made: Made | None, taken: set[Path]) -> None:
+    from o3d_relief.scene.write import write_mesh
+    from o3d_relief.workshop import write_work
+
+    if options.strict and relief.certificate.failures:
+        raise ReliefError(f"{options.output} is not written (--strict): {relief.certificate.failures[0]}")
+    if options.strict and made is not None and made.report.failures:
+        raise ReliefError(f"{options.output} is not written (--strict): {made.report.failures[0]}")
+    if made is None:
+        write_mesh(options.output, relief.mesh)
+    else:
+        write_work(options.output, made.work, height_map=options.height_map, taken=taken)
+    if options.report is not None:
+        write_report(options.report, relief, made)
+    if options.walls is not None and made is not None:
+        made.draw_walls(options.walls)
+    if options.stages is not None:
+        write_stages(options.stages, relief)
+
+
+def _read(path: Path, scan: ScanParams) -> tuple[TriangleMesh | PointCloud, ScanParams | None]:
+    """Read the scene and say what it is; return it and, for a point cloud, how to mesh it."""
+    from o3d_relief.scene.arrays import MeshArrays, to_open3d
+    from o3d_relief.scene.read import left_out, read_arrays
+
+    arrays = read_arrays(path)
+    if isinstance(arrays, MeshArrays):
+        tell(f"{path}: {len(arrays.vertices)} vertices, {len(arrays.faces)} triangles")
+        for note in left_out(path, arrays):
+            tell(note)
+        if scan != ScanParams(seed=scan.seed):
+            raise ParameterError(f"{path} is a mesh: the options for scans are for point clouds only.")
+        return to_open3d(arrays), None
+    carried = [
+        name
+        for name, there in (("colours", arrays.colors is not None), ("normals", arrays.normals is not None))
+        if there
+    ]
+    words = f", with {' and '.join(carried)}" if carried else ""
+    if arrays.sensor is not None and scan.sensor is None:
+        scan = replace(scan, sensor=arrays.sensor)
+        words += f", seen from {' '.join(f'{c:g}' for c in arrays.sensor)}"
+    tell(f"{path}: a point cloud of {len(arrays.points)} points{words}; it is meshed first")
+    return arrays.to_open3d(), scan
+
+
+def _check_places(options: argparse.Namespace) -> set[Path]:
+    """Check before the long work that everything can be written, and nothing over something else.
+
+    Returns the files that nothing else may replace.
+    """
+    check_place(options.output)
+    taken = {options.input.resolve(): "the input", options.output.resolve(): "the output"}
+    if len(taken) == 1:
+        raise FileError(f"{options.output} is the input, which would be lost: choose another output.")
+    for name, path in (
+        ("report", options.report),
+        ("picture", options.walls),
+        ("height map", options.height_map),
+    ):
+        if path is None:
+            continue
+        check_place(path)
+        if path.resolve() in taken:
+            raise FileError(f"{path} is {taken[path.resolve()]}: choose another {name}.")
+        taken[path.resolve()] = f"the {name}"
+    if options.stages is not None and options.stages.exists() and not options.stages.is_dir():
+        raise FileError(f"{options.stages} is a file, not a folder for pictures.")
+    return set(taken)
+
+
+def _check_endings(options: argparse.Namespace, *, solid: bool) -> None:
+    """Check that there is a writer for each file."""
+    from o3d_relief.scene.write import check_writable
+    from o3d_relief.solid.formats import check_solid_writable
+    from o3d_relief.solid.heightmap import check_height_map
+
+    (check_solid_writable if solid else check_writable)(options.output)
+    if options.height_map is not None:
+        check_height_map(options.height_map)

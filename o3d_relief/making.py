@@ -1,0 +1,150 @@
+"""The command's way from a relief to a checked solid."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import open3d as o3d
+from numpy.typing import NDArray
+
+from o3d_relief.params import ReliefParams, View
+from o3d_relief.pipeline import Relief
+from o3d_relief.plate_params import PlateParams
+from o3d_relief.solid.body import Solid
+from o3d_relief.solid.checks import SolidReport, check_solid
+from o3d_relief.solid.estimate import estimate_solid
+from o3d_relief.solid.make import make_solid
+from o3d_relief.solid.measures import wall_thickness
+from o3d_relief.workshop import Work, work_on
+from o3d_relief.workshop_params import MillParams, TileParams
+
+__all__ = ["Made", "make_checked", "tell_estimate", "wall_picture"]
+
+Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Made:
+    """A solid, how it was asked for and what was measured on it."""
+
+    solid: Solid
+    plate: PlateParams
+    report: SolidReport
+    work: Work
+
+    def values(self) -> dict[str, Any]:
+        """Return what the report file says of the solid."""
+        return {"plate": asdict(self.plate), "solid": self.report.values(), **self.work.report()}
+
+    def draw_walls(self, path: Path) -> None:
+        """Write a picture of the wall thickness, see `wall_picture`."""
+        from o3d_relief.show.render import save_png
+
+        save_png(path, wall_picture(self.solid, self.plate))
+
+
+def make_checked(
+    relief: Relief,
+    plate: PlateParams,
+    tell: Tell,
+    *,
+    mill: MillParams | None = None,
+    undercut_free: bool = False,
+    tiles: TileParams | None = None,
+) -> Made:
+    """Make a solid, mill and cut it as far as asked for, check it and tell what comes out.
+
+    Parameters
+    ----------
+    relief : Relief
+    plate : PlateParams
+    tell : callable
+        Takes a line.
+    mill, undercut_free, tiles
+        See `work_on`.
+
+    Returns
+    -------
+    Made
+    """
+    work = work_on(make_solid(relief, plate), mill=mill, undercut_free=undercut_free, tiles=tiles)
+    solid = work.solid
+    report = check_solid(solid, plate)
+    x, y, z = report.size_mm
+    tell(
+        f"solid: {x:.2f} x {y:.2f} x {z:.2f} mm, {report.volume_mm3 / 1000.0:.1f} cm3, {report.triangles} "
+        f"triangles; print checks: {report.verdict}"
+    )
+    for sentence in (*report.failures, *report.warnings, *work.sentences()):
+        tell(f"  {sentence}")
+    return Made(solid=solid, plate=plate, report=report, work=work)
+
+
+def tell_estimate(
+    mesh: o3d.geometry.TriangleMesh, params: ReliefParams, view: View, plate: PlateParams, tell: Tell
+) -> None:
+    """Tell what a solid will measure.
+
+    Parameters
+    ----------
+    mesh : open3d.geometry.TriangleMesh
+    params : ReliefParams
+    view : View
+    plate : PlateParams
+    tell : callable
+        Takes a line.
+    """
+    found = estimate_solid(mesh, params, view, plate)
+    x, y, z = found.size_mm
+    depth = f"{z:.2f}" if found.depth_known else f"at most {z:.2f}"
+    tell(f"size      {x:.2f} x {y:.2f} x {depth} mm")
+    tell(f"volume    about {found.volume_mm3 / 1000.0:.0f} cm3")
+    tell(f"triangles about {found.triangles}")
+    tell(f"memory    about {found.memory_mb / 1000.0:.1f} GB")
+
+
+def wall_picture(
+    solid: Solid, plate: PlateParams, *, size: tuple[int, int] = (700, 700)
+) -> NDArray[np.uint8]:
+    """Draw where the walls are too thin, from the front and from the side.
+
+    Parameters
+    ----------
+    solid : Solid
+    plate : PlateParams
+        What is thinner than its `min_wall_mm` is coloured by the millimetres that are missing.
+    size : (width, height)
+        Of each view, in pixels.
+
+    Returns
+    -------
+    (h, w, 3) uint8
+    """
+    from o3d_relief.show.render import render, view_direction
+    from o3d_relief.show.sheets import contact_sheet
+
+    place, _, _, corners = solid.seam_split()
+    thinnest = np.full(len(place), np.inf)
+    np.minimum.at(thinnest, corners.ravel(), np.repeat(wall_thickness(solid), 3))
+    mesh = o3d.geometry.TriangleMesh(
+        o3d.utility.Vector3dVector(solid.vertices[place]),
+        o3d.utility.Vector3iVector(corners.astype(np.int32)),
+    )
+    missing = np.maximum(0.0, plate.min_wall_mm - thinnest)
+    pictures = [
+        render(
+            mesh,
+            direction=view_direction(yaw),
+            size=size,
+            field=missing,
+            field_range=(0.0, plate.min_wall_mm),
+            field_label="mm too thin",
+            colormap="heat",
+        )
+        for yaw in (0, 55)
+    ]
+    return contact_sheet(pictures, 2)

@@ -1,0 +1,1 @@
+"""What goes out to be made: closed bodies in millimetres."""

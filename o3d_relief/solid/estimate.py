@@ -1,0 +1,148 @@
+"""What a solid will measure, before the work."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import open3d as o3d
+from numpy.typing import NDArray
+
+from o3d_relief.params import ReliefParams, View
+from o3d_relief.plate_params import PlateParams
+from o3d_relief.rays import unit_box
+from o3d_relief.scene.convert import mesh_arrays
+from o3d_relief.scene.frame import to_relief_units
+from o3d_relief.solid.sizes import scale_for
+from o3d_relief.steps import frame_step, perspective_step
+
+__all__ = ["Estimate", "estimate_solid", "relief_depth"]
+
+_LINES = 256
+"""Lines along x and along y that measure how high the scene stands."""
+_FLATTENED = 0.65
+"""Heights in a relief over those in proportion: most of it comes closer to S; 0.45 to 0.8 measured."""
+_MEGABYTES, _BYTES_PER_TRIANGLE = 600.0, 1000.0
+"""Peak memory, measured on scenes of 20,000 to 870,000 triangles."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """What to expect.
+
+    Attributes
+    ----------
+    size_mm : (x, y, z)
+        Width and height; x, and z where a depth was asked for, are what the solid will measure. The
+        rest can be smaller: parts that end behind the relief plane are cut off.
+    depth_known : bool
+        False where no depth was asked for; z is then that of the scene, the most that it can be.
+    volume_mm3 : float
+        Roughly.
+    triangles : int
+        Of the scene; the solid has about as many.
+    memory_mb : float
+        Peak memory of the whole work, roughly, in megabytes.
+    """
+
+    size_mm: tuple[float, float, float]
+    depth_known: bool
+    volume_mm3: float
+    triangles: int
+    memory_mb: float
+
+
+def estimate_solid(
+    mesh: o3d.geometry.TriangleMesh, params: ReliefParams, view: View, plate: PlateParams
+) -> Estimate:
+    """Estimate the solid's measures from the scene alone.
+
+    Parameters
+    ----------
+    mesh : open3d.geometry.TriangleMesh
+    params : ReliefParams
+    view : View
+    plate : PlateParams
+
+    Returns
+    -------
+    Estimate
+
+    Raises
+    ------
+    MeshError
+        A mesh from which no relief can be made.
+    """
+    vertices, faces, unit = _seen(mesh, view)
+    used = vertices[np.unique(faces)]
+    scale = scale_for(used[:, :2], plate)
+    width, height, scene_depth = np.ptp(used, axis=0) * scale
+    depth, known = scene_depth, False
+    if plate.depth_mm is not None:
+        depth, known = plate.depth_mm - plate.back_mm, True
+    elif params.depth is not None:
+        wanted = params.depth / unit * scale
+        depth, known = min(depth, wanted), wanted <= depth
+    covered, mean_height = _front(vertices, faces)
+    total_height = (plate.width_mm - 2.0 * plate.edge_mm) * height / width + 2.0 * plate.edge_mm
+    share = {"rectangle": 1.0, "ellipse": np.pi / 4.0, "contour": covered, "none": 0.0}[plate.shape]
+    volume = plate.width_mm * total_height * share * plate.back_mm
+    volume += width * height * covered * mean_height * _FLATTENED * depth
+    return Estimate(
+        size_mm=(plate.width_mm, float(total_height), float(depth + plate.back_mm)),
+        depth_known=known,
+        volume_mm3=float(volume),
+        triangles=len(faces),
+        memory_mb=_MEGABYTES + _BYTES_PER_TRIANGLE * len(faces) / 1e6,
+    )
+
+
+def relief_depth(mesh: o3d.geometry.TriangleMesh, view: View, plate: PlateParams) -> float | None:
+    """Return the depth of the relief, in the input's unit, that gives the solid's depth in millimetres.
+
+    Parameters
+    ----------
+    mesh : open3d.geometry.TriangleMesh
+    view : View
+    plate : PlateParams
+
+    Returns
+    -------
+    float or None
+        None where the plate asks for no depth.
+
+    Raises
+    ------
+    MeshError
+        A mesh from which no relief can be made.
+    """
+    if plate.depth_mm is None:
+        return None
+    vertices, faces, unit = _seen(mesh, view)
+    scale = scale_for(vertices[np.unique(faces), :2], plate)
+    return (plate.depth_mm - plate.back_mm) / scale * unit
+
+
+def _seen(
+    mesh: o3d.geometry.TriangleMesh, view: View
+) -> tuple[NDArray[np.float64], NDArray[np.int64], float]:
+    """Return the scene as the relief takes it: vertices in relief units, faces, and the unit."""
+    vertices, faces = mesh_arrays(mesh)
+    frame = frame_step(vertices, faces, view)
+    placed = perspective_step(to_relief_units(vertices, frame, on_grid=True), view).vertices
+    return placed, faces, frame.unit
+
+
+def _front(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> tuple[float, float]:
+    """Return the share of the extents that the scene covers, and its mean height there, from 0 to 1."""
+    scene, middle, size = unit_box(vertices, faces)
+    used = (vertices[np.unique(faces)] - middle) / size
+    low, high = used.min(axis=0), used.max(axis=0)
+    steps = (np.arange(_LINES) + 0.5) / _LINES
+    x, y = np.meshgrid(low[0] + steps * (high[0] - low[0]), low[1] + steps * (high[1] - low[1]))
+    start = np.stack([x.ravel(), y.ravel(), np.full(x.size, high[2] + 0.1)], axis=1)
+    rays = np.concatenate([start, np.tile([0.0, 0.0, -1.0], (x.size, 1))], axis=1).astype(np.float32)
+    t = scene.cast_rays(o3d.core.Tensor(rays))["t_hit"].numpy().astype(np.float64)
+    met = np.isfinite(t)
+    heights = (high[2] + 0.1 - t[met] - low[2]) / max(float(high[2] - low[2]), 1e-300)
+    return float(met.mean()), float(heights.mean()) if met.any() else 0.0

@@ -1,0 +1,153 @@
+"""From a relief to one closed body on its plate."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o3d_relief.errors import MeshError, ParameterError
+from o3d_relief.pipeline import Relief
+from o3d_relief.plate_params import PlateParams
+from o3d_relief.scene.arrays import MeshArrays, from_open3d
+from o3d_relief.solid.bodies import joined
+from o3d_relief.solid.body import Solid, manifold_of
+from o3d_relief.solid.parts import closed_parts
+from o3d_relief.solid.pieces import Piece
+from o3d_relief.solid.plate import outline, plate, pockets
+from o3d_relief.solid.refine import refined_for_texture
+from o3d_relief.solid.sizes import fitted, shortfall, to_millimetres
+from o3d_relief.solid.surface_colors import surface_colors
+from o3d_relief.solid.walls import with_thicker_walls
+
+if TYPE_CHECKING:
+    import manifold3d
+
+__all__ = ["make_solid", "solid_of"]
+
+_ATTEMPTS = 3
+_EXACT = 1e-9
+"""Share of a length by which it may be off."""
+_COLOR_MM = 0.8
+"""Longest edge where a texture changes: colours of prints are not much finer."""
+
+
+def make_solid(relief: Relief, params: PlateParams | None = None) -> Solid:
+    """Make one closed body of a relief and a plate.
+
+    The relief's surface stays as it is, scaled; where `depth_mm` asks for another depth than the relief
+    has in proportion, z is scaled on its own (make the relief with the right `ReliefParams.depth` to avoid
+    that).
+
+    Parameters
+    ----------
+    relief : Relief
+        Never modified.
+    params : PlateParams, optional
+
+    Returns
+    -------
+    Solid
+        `width_mm` wide and `depth_mm` deep, its back flat.
+
+    Raises
+    ------
+    MeshError
+        Nothing of the relief encloses a volume.
+    ParameterError
+        A plate too small for what it is to hang from.
+
+    Examples
+    --------
+    >>> import open3d as o3d
+    >>> from o3d_relief.params import ReliefParams
+    >>> from o3d_relief.pipeline import make_relief
+    >>> relief = make_relief(o3d.geometry.TriangleMesh.create_sphere(), ReliefParams(k=4))
+    >>> make_solid(relief, PlateParams(width_mm=80, depth_mm=20)).size[[0, 2]].round(3).tolist()
+    [80.0, 20.0]
+    """
+    params = PlateParams() if params is None else params
+    if not isinstance(params, PlateParams):
+        raise ParameterError(f"params must be a PlateParams. Got {params!r} instead.")
+    return solid_of(from_open3d(relief.mesh), params)
+
+
+def solid_of(mesh: MeshArrays, params: PlateParams) -> Solid:
+    """Make one closed body of a surface in front of z = 0 and a plate; see `make_solid`.
+
+    Parameters
+    ----------
+    mesh : MeshArrays
+        In any unit, cut at z = 0 exactly, seen from z+.
+    params : PlateParams
+    """
+    width = float(np.ptp(mesh.vertices[mesh.faces.ravel(), 0]))
+    mesh = refined_for_texture(mesh, _COLOR_MM * width / params.width_mm)
+    vertices, depth_ratio = to_millimetres(mesh.vertices, mesh.faces, params)
+    colors = surface_colors(mesh)
+    parts = closed_parts(vertices, mesh.faces, floor=-params.embed_mm, thickness=params.thickness_mm)
+    if not parts.pieces:
+        raise MeshError("Nothing of the relief encloses a volume: there is nothing to print.")
+    # Once, but where what was furthest out turns out to be loose, or a crumb, and is left out.
+    wide = deep = 1.0
+    for _ in range(_ATTEMPTS):
+        pieces = fitted(parts.pieces, params, wide=wide, deep=deep)
+        whole, settled = joined(_on_plate(pieces, colors, params), params)
+        wider, deeper = shortfall(whole.bounding_box(), params)
+        if abs(wider - 1.0) < _EXACT and abs(deeper - 1.0) < _EXACT:
+            break
+        wide, deep = wide * wider, deep * deeper
+    depth_ratio *= deep / wide
+    result = Solid.from_manifold(whole, colored=colors is not None)
+    counts = {f"parts_{name}": count for name, count in parts.counts.items()}
+    return replace(result, counts={"depth_ratio": depth_ratio, **counts, **settled})
+
+
+def _on_plate(
+    pieces: Sequence[Piece], colors: NDArray[np.float64] | None, params: PlateParams
+) -> manifold3d.Manifold:
+    """Unite everything."""
+    import manifold3d
+
+    body = _united(pieces, colors)
+    # The back of a shell may reach further down than the plate is thick.
+    lowest = 0.0 if params.shape == "none" else -(params.embed_mm + params.base_mm) / 2.0
+    if body.bounding_box()[2] < lowest:
+        body = body.trim_by_plane((0.0, 0.0, 1.0), lowest)
+    main, shape = body, manifold3d.CrossSection()
+    if params.shape != "none":
+        shape = outline(_silhouette(pieces, body, params), params)
+        main = plate(shape, params) + body
+    if params.thicken:
+        main = with_thicker_walls(Solid.from_manifold(main, colored=colors is not None), params.min_wall_mm)
+    return main if params.hanging == "none" else main - pockets(shape, params)
+
+
+def _united(pieces: Sequence[Piece], colors: NDArray[np.float64] | None) -> manifold3d.Manifold:
+    import manifold3d
+
+    bodies = [
+        manifold_of(
+            piece.vertices,
+            piece.faces,
+            colors=np.ones((1, 3)) if colors is None else colors[piece.source],
+            is_plate=False,
+        )
+        for piece in pieces
+    ]
+    return manifold3d.Manifold.batch_boolean(bodies, manifold3d.OpType.Add)
+
+
+def _silhouette(
+    pieces: Sequence[Piece], body: manifold3d.Manifold, params: PlateParams
+) -> manifold3d.CrossSection:
+    """Return what the relief covers seen from the front; its convex hull where the shape needs no more."""
+    import manifold3d
+
+    if params.shape == "contour":
+        return manifold3d.CrossSection(body.project().to_polygons(), manifold3d.FillRule.Positive)
+    points = np.concatenate([piece.vertices[:, :2] for piece in pieces])
+    return manifold3d.CrossSection.hull_points(points)
