@@ -7,23 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
+from o3d_relief.bounds.correction import Correction
 from o3d_relief.bounds.crossings import crossings, edges_of
 from o3d_relief.bounds.pairs import Pairs, foot_pairs
-from o3d_relief.errors import SolverError
-from o3d_relief.linalg.quadratic import minimise
 
 __all__ = ["Ordered", "keep_order", "out_of_order"]
-
-_REACH = 4.0
-"""Distance over which a correction fades out, in multiples of its size: slopes change by a quarter."""
-
-_SHORTEST, _LONGEST = 1.5, 8.0
-"""The same in relief units, at least and at most."""
-
-_REGION = 3.0
-"""What lies further from every correction than this many reaches is not touched, unless it is in the way."""
 
 _MARGIN = 0.05
 """Pairs are set this far beyond their smallest gap, or a quarter of what they have, if that is less."""
@@ -37,6 +26,9 @@ _FORGETFUL = 7
 every pair that was ever wrong stays held, so that the rounds come to an end."""
 
 _ROUNDS = 40
+
+_CELLS = 256
+"""Raster, to each side, on which is looked up what lies above and below what moved."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -132,17 +124,16 @@ def keep_order(
         A quadratic programme was not solved.
     """
     front = np.zeros(len(z), dtype=bool) if in_front is None else in_front
-    system = _Correction(vertices, laplacian, areas, z)
-    edges = edges_of(faces)
+    system = Correction(vertices, laplacian, areas, z)
+    near = faces
     held, floor = np.zeros(len(pairs), dtype=bool), np.zeros(len(z), dtype=bool)
     current, best, fewest, rounds = z, z, np.inf, 0
     while True:
         wrong = out_of_order(pairs, current, min_gap=min_gap)
         behind = front & (current < 0.0)
-        crossing, at_foot = (
-            _new_crossings(vertices, faces, edges, current),
-            foot_pairs(vertices, faces, edges, current),
-        )
+        edges = edges_of(near)
+        crossing = _new_crossings(vertices, near, edges, current)
+        at_foot = foot_pairs(vertices, near, edges, current)
         left = int(wrong.sum() + behind.sum()) + len(crossing) // 2 + len(at_foot)
         if left < fewest:
             best, fewest = current, left
@@ -150,15 +141,48 @@ def keep_order(
             break
         if rounds < _FORGETFUL:
             held[held] = ~_spare(pairs.select(held), current, min_gap)
+        before = held.copy()
         held |= _worst_of_stacks(pairs, current, wrong, min_gap)
         pairs = Pairs.join([pairs, crossing, at_foot])
         held = np.append(held, np.ones(len(pairs) - len(held), dtype=bool))
+        new = held.copy()
+        new[: len(before)] &= ~before
+        touched = behind & ~floor
+        for corners in (pairs.upper[new], pairs.lower[new]):
+            touched[corners] = True
         floor |= behind
         chosen = pairs.select(held)
-        current = system.solve(chosen, _wanted_gaps(chosen, min_gap), floor)
+        last = current
+        current = system.solve(chosen, _wanted_gaps(chosen, min_gap), floor, touched)
         current = np.where(floor, np.maximum(current, 0.0), current)
+        near = faces[_over_or_under(vertices, faces, current != last)]
         rounds += 1
     return Ordered(z=best, rounds=rounds, corrected_pairs=int(held.sum() + floor.sum()), left=int(fewest))
+
+
+def _over_or_under(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], moved: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Find the triangles that may lie above or below one with a vertex that moved, (m,)."""
+    low, high = vertices[:, :2].min(axis=0), vertices[:, :2].max(axis=0)
+    cell = ((vertices[:, :2] - low) / (high - low + 1e-9) * _CELLS).astype(np.int64)
+    corners = cell[faces]
+    first, last = corners.min(axis=1), corners.max(axis=1) + 1
+    # Count, in each cell of a raster, the boxes of triangles that moved; then ask for the boxes of all.
+    steps = np.zeros((_CELLS + 1, _CELLS + 1), dtype=np.int64)
+    changed = moved[faces].any(axis=1)
+    for x, y, sign in ((first, first, 1), (last, last, 1), (first, last, -1), (last, first, -1)):
+        np.add.at(steps, (x[changed, 0], y[changed, 1]), sign)
+    marked = steps.cumsum(axis=0).cumsum(axis=1)[:-1, :-1] > 0
+    total = np.zeros((_CELLS + 1, _CELLS + 1), dtype=np.int64)
+    total[1:, 1:] = marked.cumsum(axis=0).cumsum(axis=1)
+    within = (
+        total[last[:, 0], last[:, 1]]
+        - total[first[:, 0], last[:, 1]]
+        - total[last[:, 0], first[:, 1]]
+        + total[first[:, 0], first[:, 1]]
+    )
+    return np.asarray(within > 0)
 
 
 def _new_crossings(
@@ -203,67 +227,3 @@ def _worst_of_stacks(
     worst = np.zeros(len(pairs), dtype=bool)
     worst[np.flatnonzero(wrong)[order[first]]] = True
     return worst
-
-
-class _Correction:
-    """The quadratic form of the correction, near what has to be corrected."""
-
-    def __init__(
-        self,
-        vertices: NDArray[np.float64],
-        laplacian: sp.csr_array,
-        areas: NDArray[np.float64],
-        z: NDArray[np.float64],
-    ) -> None:
-        self._vertices = vertices
-        self._laplacian = laplacian
-        self._areas = areas
-        self._z = z
-        self._size = np.zeros(len(vertices))
-        self._widening = 1.0
-
-    def solve(
-        self, pairs: Pairs, wanted: NDArray[np.float64], floor: NDArray[np.bool_]
-    ) -> NDArray[np.float64]:
-        """Return the heights that keep the gaps wanted, and those of `floor` at 0 or above."""
-        upper, lower = pairs.heights(self._z)
-        missing = wanted - (upper - lower)
-        lift = np.where(floor, -self._z, 0.0)
-        difference = pairs.difference(len(self._z))
-        on_floor = sp.eye_array(len(self._z), format="csr")[floor]
-        while True:
-            free, reach = self._region(pairs, missing, lift)
-            rows = sp.vstack([difference[:, free], on_floor[:, free]], format="csr")
-            least = np.concatenate([missing, lift[floor]])
-            form = self._laplacian[free][:, free] + sp.diags_array(self._areas[free] / reach**2)
-            correction = minimise(form, np.zeros(len(free)), rows, least)
-            if correction is not None:
-                break
-            if len(free) == len(self._z):
-                raise SolverError(
-                    f"The order of {len(pairs)} pairs of surfaces could not be restored; the mesh is likely "
-                    "broken near very thin triangles: repair it, or give in_order=False."
-                )
-            self._widening *= 2.0  # what lies around the region leaves no room
-        result: NDArray[np.float64] = self._z.copy()
-        result[free] += correction
-        return result
-
-    def _region(
-        self,
-        pairs: Pairs,
-        missing: NDArray[np.float64],
-        lift: NDArray[np.float64],
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Return the vertices that a correction may move, and how far it reaches at each of them."""
-        for corners in (pairs.upper, pairs.lower):
-            np.maximum.at(self._size, corners.ravel(), np.repeat(missing, 3))
-        self._size = np.maximum(self._size, lift)
-        touched = np.flatnonzero(self._size > 0.0)
-        distance, nearest = cKDTree(self._vertices[touched]).query(
-            self._vertices, distance_upper_bound=self._widening * _REGION * _LONGEST
-        )
-        near = np.flatnonzero(np.isfinite(distance))
-        reach = np.clip(_REACH * self._size[touched][nearest[near]], _SHORTEST, _LONGEST)
-        inside = distance[near] <= self._widening * _REGION * reach
-        return near[inside], reach[inside]

@@ -1,0 +1,148 @@
+"""The least correction that brings surfaces back into order."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from o3d_relief.bounds.pairs import Pairs
+from o3d_relief.errors import SolverError
+from o3d_relief.linalg.quadratic import minimise
+
+__all__ = ["Correction"]
+
+_REACH = 4.0
+"""Distance over which a correction fades out, in multiples of its size: slopes change by a quarter."""
+
+_SHORTEST, _LONGEST = 1.5, 8.0
+"""The same in relief units, at least and at most."""
+
+_REGION = 3.0
+"""What lies further from every correction than this many reaches is not touched, unless it is in the way."""
+
+
+class Correction:
+    """The least correction of heights that keeps gaps, near what has to be corrected.
+
+    minimise  e' C e + sum of A_i e_i^2 / reach_i^2   subject to inequalities on z + e.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+        Original positions, in relief units.
+    laplacian : (n, n) sparse float64
+        C.
+    areas : (n,) float64
+    z : (n,) float64
+        Heights to correct.
+    """
+
+    def __init__(
+        self,
+        vertices: NDArray[np.float64],
+        laplacian: sp.csr_array,
+        areas: NDArray[np.float64],
+        z: NDArray[np.float64],
+    ) -> None:
+        self._vertices = vertices
+        self._laplacian = laplacian
+        self._areas = areas
+        self._z = z
+        self._size = np.zeros(len(vertices))
+        self._reach = np.zeros(len(vertices))
+        self._correction = np.zeros(len(vertices))
+        self._widening = 1.0
+
+    def solve(
+        self,
+        pairs: Pairs,
+        wanted: NDArray[np.float64],
+        floor: NDArray[np.bool_],
+        new: NDArray[np.bool_],
+    ) -> NDArray[np.float64]:
+        """Find the heights that keep the gaps wanted, and what is in front of S there.
+
+        Corrections that hang together neither by the surface nor by pairs are programmes of their own:
+        those in which nothing is new stay as they are.
+
+        Parameters
+        ----------
+        pairs : Pairs
+        wanted : (p,) float64
+            Their gaps.
+        floor : (n,) bool
+            Vertices that are to lie at 0 or above.
+        new : (n,) bool
+            Vertices of pairs that were not among those of the last call, and of the floor.
+
+        Returns
+        -------
+        (n,) float64
+
+        Raises
+        ------
+        SolverError
+            No heights do so, or the solver did not find them.
+        """
+        upper, lower = pairs.heights(self._z)
+        missing = wanted - (upper - lower)
+        lift = np.where(floor, -self._z, 0.0)
+        rows = sp.vstack(
+            [pairs.difference(len(self._z)), sp.eye_array(len(self._z), format="csr")[floor]], format="csr"
+        )
+        least = np.concatenate([missing, lift[floor]])
+        while True:
+            reach = self._reaches(pairs, missing, lift)
+            free = np.flatnonzero((reach > 0.0) & self._concerned(reach, rows, new | (reach != self._reach)))
+            own_rows = np.diff(rows[:, free].indptr) > 0
+            form = self._laplacian[free][:, free] + sp.diags_array(self._areas[free] / reach[free] ** 2)
+            correction = minimise(form, np.zeros(len(free)), rows[own_rows][:, free], least[own_rows])
+            if correction is not None:
+                break
+            if (reach > 0.0).all():
+                raise SolverError(
+                    f"The order of {len(pairs)} pairs of surfaces could not be restored; the mesh is likely "
+                    "broken near very thin triangles: repair it, or give in_order=False."
+                )
+            self._widening *= 2.0  # what lies around the region leaves no room
+        self._reach = reach
+        self._correction[free] = correction
+        return np.asarray(self._z + self._correction)
+
+    def _concerned(
+        self, reach: NDArray[np.float64], rows: sp.csr_array, touched: NDArray[np.bool_]
+    ) -> NDArray[np.bool_]:
+        """Find the vertices whose corrections hang together with those of the vertices touched."""
+        free = np.flatnonzero(reach > 0.0)
+        coupling = rows[:, free]
+        graph = self._laplacian[free][:, free] + coupling.T @ coupling
+        count, label = connected_components(graph, directed=False)
+        wanted = np.zeros(count, dtype=bool)
+        wanted[label[touched[free]]] = True
+        concerned = np.zeros(len(reach), dtype=bool)
+        concerned[free] = wanted[label]
+        return concerned
+
+    def _reaches(
+        self,
+        pairs: Pairs,
+        missing: NDArray[np.float64],
+        lift: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """Return how far a correction reaches at each vertex, 0 where none may move it."""
+        for corners in (pairs.upper, pairs.lower):
+            np.maximum.at(self._size, corners.ravel(), np.repeat(missing, 3))
+        self._size = np.maximum(self._size, lift)
+        touched = np.flatnonzero(self._size > 0.0)
+        reach_there = np.clip(_REACH * self._size[touched], _SHORTEST, _LONGEST)
+        distance, nearest = cKDTree(self._vertices[touched]).query(
+            self._vertices, distance_upper_bound=self._widening * _REGION * reach_there.max()
+        )
+        near = np.flatnonzero(np.isfinite(distance))
+        inside = near[distance[near] <= self._widening * _REGION * reach_there[nearest[near]]]
+        reach = np.zeros(len(self._vertices))
+        reach[inside] = reach_there[nearest[inside]]
+        return reach
