@@ -374,7 +374,9 @@ def bounded_step(
 
     form, slivers = cotangent_laplacian(vertices, faces, weights=weight)
     stacked = vertex_pairs(vertices, faces)
-    ties = tie_parts(vertices, faces, form, np.arange(n), stacked, stacked.gap * (depth / deep), across_gaps=_EMPTY)
+    ties = tie_parts(
+        vertices, faces, form, np.arange(n), stacked, stacked.gap * (depth / deep), across_gaps=_EMPTY
+    )
     found = closest_relief(
         vertices,
         faces,
@@ -384,6 +386,7 @@ def bounded_step(
         seen,
         visible,
         pull=np.zeros(n) if ties is None else ties.among_held_pull,
+        min_gap=params.min_gap / scene.unit,
         attach=attached,
     )
     counts = {
@@ -391,6 +394,7 @@ def bounded_step(
         "slivers_mended": slivers,
         "rounds": found.rounds,
         "constraints": found.watched,
+        "pairs_corrected": found.corrected_pairs,
         "attached": len(attached),
         "attached_missed": found.attached_missed,
         "left": found.left,
@@ -404,7 +408,9 @@ def _attached(scene: SceneStage, params: ReliefParams) -> NDArray[np.int64]:
     count = len(scene.welded_index)
     chosen = np.array(params.attach, dtype=np.int64)
     if len(chosen) and chosen.max() >= count:
-        raise ParameterError(f"attach must be numbers of the mesh's {count} vertices. Got {chosen.max()} instead.")
+        raise ParameterError(
+            f"attach must be numbers of the mesh's {count} vertices. Got {chosen.max()} instead."
+        )
     welded = np.unique(scene.welded_index[chosen])
     return np.asarray(welded[welded >= 0])
 

@@ -8,8 +8,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from o3d_relief.bounds.certificate import crossings
-from o3d_relief.bounds.missed import missed_pairs
+from o3d_relief.bounds.missed import BetweenLines
+from o3d_relief.bounds.order import out_of_order
 from o3d_relief.bounds.pairs import Pairs
 from o3d_relief.linalg.interior import minimise
 
@@ -26,12 +26,6 @@ _HOLD = 1e3
 
 _HELD = 1e-2
 """Attached vertices that end within this share of the depth of S are set onto it."""
-
-_TRIES = 6
-"""Times that surfaces which touch between the tested lines are kept apart and the relief solved again."""
-
-_AGAIN = 0.05
-"""Complementarity with which the solver goes on then, as a share of the energy."""
 
 _LOOSE = 1e-9
 """Weight that keeps the system definite where nothing else holds a vertex."""
@@ -51,18 +45,21 @@ class Bounded:
         Rows of constraints that took part.
     gap : float
         Bound on how far the energy is above its minimum, as a share of it.
+    corrected_pairs : int
+        Pairs between the tested lines that had to be kept apart, too.
+    left : int
+        Pairs that are closer than asked for.
     attached_missed : int
         Attached vertices that could not be brought to S.
-    left : int
-        Pairs that are still out of order, between the lines on which the order is kept.
     """
 
     z: NDArray[np.float64]
     rounds: int
     watched: int
     gap: float
-    attached_missed: int
+    corrected_pairs: int
     left: int
+    attached_missed: int
 
 
 def closest_relief(
@@ -75,6 +72,7 @@ def closest_relief(
     visible: NDArray[np.bool_],
     *,
     pull: NDArray[np.float64],
+    min_gap: float,
     attach: NDArray[np.int64],
 ) -> Bounded:
     """Find the heights within a depth that change the differential coordinates least.
@@ -104,6 +102,8 @@ def closest_relief(
     visible : (n,) bool
     pull : (n,) float64
         Right-hand side that belongs to springs in `form`, zeros for none.
+    min_gap : float
+        Smallest gap of pairs that were not closer before.
     attach : (a,) int64
         Vertices to hold on S.
 
@@ -120,57 +120,65 @@ def closest_relief(
     held[attach] = _HOLD
     hessian = (form + sp.diags_array(held + _LOOSE)).tocsr()
     lower = np.where(visible & (held == 0.0), -z, -np.inf)
-    rows = sp.vstack([gap_rows(pairs, n), seen]).tocsr()
-    bound = np.concatenate([(_KEPT_GAP * ratio - 1.0) * pairs.gap, -(seen @ z)])
-    before, _ = crossings(vertices, faces)
-    start, barrier, rounds, left = None, 0.3, 0, 0
-    for _ in range(_TRIES):
-        found = minimise(
-            hessian,
-            pull - held * z,
-            inside=inside,
-            lower=lower,
-            upper=depth - z,
-            rows=rows,
-            bound=bound,
-            start=start,
-            barrier=barrier,
-        )
-        rounds += found.rounds
-        result = _placed(z + found.x, rows, seen, visible, attach, depth)
-        wrong = missed_pairs(vertices, faces, result, before)
-        left = len(wrong)
-        if left == 0:
-            break
-        rows = sp.vstack([rows, gap_rows(wrong, n)]).tocsr()
-        bound = np.concatenate([bound, (_KEPT_GAP * ratio - 1.0) * wrong.gap])
-        start, barrier = found.x, _AGAIN
-        print('again',left,found.rounds)
-    # Rounding must not leave anything visible behind S or beyond the depth.
-    result = np.minimum(np.where(visible, np.maximum(result, 0.0), result), depth)
+    # Linear scaling must keep a little of its room: that is as far as a smallest gap can be asked for here.
+    kept = np.clip(np.minimum(pairs.gap, min_gap), _KEPT_GAP * ratio * pairs.gap, 0.7 * ratio * pairs.gap)
+    place = _Place(gap_rows(pairs, n), seen, visible, attach, depth)
+    between = BetweenLines(vertices, faces)
+    added = [0]
+
+    def missed(
+        x: NDArray[np.float64], accepted: NDArray[np.float64]
+    ) -> tuple[sp.csr_array, NDArray[np.float64]]:
+        wrong = between.missed_pairs(place(z + x))
+        there = np.subtract(*wrong.heights(z + accepted))
+        wrong, there = wrong.select(there > 0.0), there[there > 0.0]
+        added[0] += len(wrong)
+        return gap_rows(wrong, n), np.minimum(_KEPT_GAP * ratio * wrong.gap, there / 2.0) - wrong.gap
+
+    found = minimise(
+        hessian,
+        pull - held * z,
+        start=inside,
+        lower=lower,
+        upper=depth - z,
+        rows=sp.vstack([gap_rows(pairs, n), seen]).tocsr(),
+        bound=np.concatenate([kept - pairs.gap, -(seen @ z)]),
+        more_rows=missed,
+    )
+    result = place(z + found.x)
     return Bounded(
         z=result,
-        rounds=rounds,
+        rounds=found.rounds,
         watched=found.watched,
         gap=found.gap,
+        corrected_pairs=added[0],
+        left=int(out_of_order(pairs, result, min_gap=(1.0 - 1e-6) * min_gap).sum()),
         attached_missed=int((result[attach] != 0.0).sum()),
-        left=left,
     )
 
 
-def _placed(
-    z: NDArray[np.float64],
-    rows: sp.csr_array,
-    seen: sp.csr_array,
-    visible: NDArray[np.bool_],
-    attach: NDArray[np.int64],
-    depth: float,
-) -> NDArray[np.float64]:
-    """Move and stretch the relief so that it reaches from S to the depth, or set what is attached onto S."""
-    if len(attach) == 0:
-        base = lowest_seen(z, seen, visible)
-        return np.asarray((z - base) * (depth / (float(z.max()) - base)))
-    return _onto_plane(z * (depth / float(z.max())), attach, rows, depth)
+class _Place:
+    """Move and stretch a relief so that it reaches from S to the depth, or set what is attached onto S."""
+
+    def __init__(
+        self,
+        gaps: sp.csr_array,
+        seen: sp.csr_array,
+        visible: NDArray[np.bool_],
+        attach: NDArray[np.int64],
+        depth: float,
+    ) -> None:
+        self._gaps, self._seen, self._visible = gaps, seen, visible
+        self._attach, self._depth = attach, depth
+
+    def __call__(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
+        if len(self._attach) == 0:
+            base = lowest_seen(z, self._seen, self._visible)
+            result = (z - base) * (self._depth / (float(z.max()) - base))
+        else:
+            result = _onto_plane(z * (self._depth / float(z.max())), self._attach, self._gaps, self._depth)
+        # Rounding must not leave anything visible behind S or beyond the depth.
+        return np.minimum(np.where(self._visible, np.maximum(result, 0.0), result), self._depth)
 
 
 def lowest_seen(z: NDArray[np.float64], seen: sp.csr_array, visible: NDArray[np.bool_]) -> float:

@@ -3,58 +3,84 @@
 from __future__ import annotations
 
 import numpy as np
+import open3d as o3d
 from numpy.typing import NDArray
 
-from o3d_relief.bounds.certificate import crossings
 from o3d_relief.bounds.pairs import Pairs, vertex_pairs
+from o3d_relief.rays import unit_box
 
-__all__ = ["edge_pairs", "missed_pairs"]
+__all__ = ["BetweenLines", "edge_pairs"]
+
+_INSIDE = 1e-3
+"""Share at both ends of an edge that does not count as crossing: there it meets its neighbours."""
 
 _SMALLEST_GAP = 1e-5
 """Points that were closer than this, in relief units, are one."""
 
 
-def missed_pairs(
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    z: NDArray[np.float64],
-    before: set[tuple[int, int]],
-) -> Pairs:
-    """Find what has changed places between the lines on which the order was kept.
+class BetweenLines:
+    """Tells what changes places between the lines on which the order is kept.
 
     Parameters
     ----------
     vertices : (n, 3) float64
         Original positions.
     faces : (m, 3) int64
-    z : (n,) float64
-        New heights.
-    before : set of (edge, face)
-        What crosses in the original, see `certificate.crossings`.
-
-    Returns
-    -------
-    Pairs
-        Pairs of points in the order of the original that are in another one now. What lies behind S does not
-        count.
     """
-    relief = np.column_stack([vertices[:, :2], z])
-    now, _ = crossings(relief, faces)
-    fresh = np.array(sorted(now - before), dtype=np.int64).reshape(-1, 2)
-    edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
-    between = edge_pairs(vertices, faces, edges[fresh[:, 0]], fresh[:, 1])
-    stacked = vertex_pairs(relief, faces)
-    gap = np.subtract(*stacked.heights(vertices[:, 2]))
-    inverted = stacked.select(gap < -_SMALLEST_GAP)
-    turned = Pairs(
-        upper=inverted.lower,
-        upper_weights=inverted.lower_weights,
-        lower=inverted.upper,
-        lower_weights=inverted.upper_weights,
-        gap=-gap[gap < -_SMALLEST_GAP],
-    )
-    found = Pairs.join([between, turned])
-    return found.select(np.maximum(*found.heights(z)) > 0.0)
+
+    def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
+        self._vertices, self._faces = vertices, faces
+        self._edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+        self._before = self._crossings(vertices)
+
+    def _crossings(self, vertices: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Return the numbers edge * faces + face of what crosses; see `certificate.crossings`."""
+        scene, middle, size = unit_box(vertices, self._faces)
+        start, end = vertices[self._edges[:, 0]], vertices[self._edges[:, 1]]
+        rays = np.concatenate([(start - middle) / size, (end - start) / size], axis=1)
+        # Rays go on behind the edge's end and meet all that is there: first find those that need a closer look.
+        ahead = rays.copy()
+        ahead[:, :3] += _INSIDE * rays[:, 3:]
+        nearest = scene.cast_rays(o3d.core.Tensor(ahead.astype(np.float32)))["t_hit"].numpy()
+        some = np.flatnonzero(nearest < 1.0 - 2.0 * _INSIDE)
+        hits = scene.list_intersections(o3d.core.Tensor(rays[some].astype(np.float32)))
+        t = hits["t_hit"].numpy()
+        inside = (t > _INSIDE) & (t < 1.0 - _INSIDE)
+        edge = some[hits["ray_ids"].numpy()[inside].astype(np.int64)]
+        face = hits["primitive_ids"].numpy()[inside].astype(np.int64)
+        apart = (self._edges[edge][:, :, None] != self._faces[face][:, None, :]).all(axis=(1, 2))
+        return np.asarray(edge * len(self._faces) + face)[apart]
+
+    def missed_pairs(self, z: NDArray[np.float64]) -> Pairs:
+        """Find what has changed places, and what crosses where nothing crossed before.
+
+        Parameters
+        ----------
+        z : (n,) float64
+            New heights.
+
+        Returns
+        -------
+        Pairs
+            In the order of the original. What lies behind S does not count.
+        """
+        relief = np.column_stack([self._vertices[:, :2], z])
+        fresh = np.setdiff1d(self._crossings(relief), self._before)
+        edge, face = self._edges[fresh // len(self._faces)], fresh % len(self._faces)
+        between = edge_pairs(self._vertices, self._faces, edge, face)
+        if len(between):
+            return between.select(np.maximum(*between.heights(z)) > 0.0)
+        stacked = vertex_pairs(relief, self._faces)
+        gap = np.subtract(*stacked.heights(self._vertices[:, 2]))
+        inverted = stacked.select(gap < -_SMALLEST_GAP)
+        turned = Pairs(
+            upper=inverted.lower,
+            upper_weights=inverted.lower_weights,
+            lower=inverted.upper,
+            lower_weights=inverted.upper_weights,
+            gap=-gap[gap < -_SMALLEST_GAP],
+        )
+        return turned.select(np.maximum(*turned.heights(z)) > 0.0)
 
 
 def edge_pairs(
@@ -82,20 +108,20 @@ def edge_pairs(
     start = _barycentric(vertices, corners, vertices[edge[:, 0], :2])
     end = _barycentric(vertices, corners, vertices[edge[:, 1], :2])
     usable = np.isfinite(start).all(axis=1) & np.isfinite(end).all(axis=1)
+    start, end = start[usable], end[usable]
+    edge, corners = edge[usable], corners[usable]
     change = end - start
     safe = np.where(change == 0.0, 1.0, change)
     at_zero = np.where(change == 0.0, np.where(start >= 0.0, -np.inf, np.inf), -start / safe)
     first = np.maximum(np.where(change >= 0.0, at_zero, -np.inf).max(axis=1), 0.0)
     last = np.minimum(np.where(change < 0.0, at_zero, np.inf).min(axis=1), 1.0)
-    usable &= first <= last
+    meet = first <= last
     found = []
     for share in (first, last):
-        t = share[usable][:, None]
+        t = share[meet][:, None]
         own = np.concatenate([1.0 - t, t, np.zeros_like(t)], axis=1)
-        weights = start[usable] + t * change[usable]
-        found.append(
-            _ordered(vertices[:, 2], edge[usable][:, [0, 1, 1]], own, corners[usable], weights)
-        )
+        weights = start[meet] + t * change[meet]
+        found.append(_ordered(vertices[:, 2], edge[meet][:, [0, 1, 1]], own, corners[meet], weights))
     return Pairs.join(found)
 
 
@@ -104,10 +130,10 @@ def _barycentric(
 ) -> NDArray[np.float64]:
     """Return the barycentric coordinates of points (q, 2) in faces seen from the front, not finite if edge-on."""
     a, b, c = vertices[corners][:, :, :2].transpose(1, 0, 2)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         area = _cross(b - a, c - a)
         second, third = _cross(points - a, c - a) / area, _cross(b - a, points - a) / area
-    return np.stack([1.0 - second - third, second, third], axis=1)
+        return np.stack([1.0 - second - third, second, third], axis=1)
 
 
 def _cross(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:

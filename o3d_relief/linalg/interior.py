@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,21 +18,25 @@ __all__ = ["Minimum", "minimise"]
 _TO_THE_WALL = 0.98
 """Share of the way to the nearest constraint that a step may go."""
 
+_FIRST_BARRIER = 0.3
+"""Complementarity at the start, as a share of x' H x / 2."""
+
+_CHECK_EVERY = 3
+"""Rounds after which further rows are asked for."""
+
+_SOME_ROOM = 0.2
+"""Room that further rows are given, as a share of what they have where they were last fulfilled."""
+
 _WATCHED = 1.6
 """Rows that a step so many times as long would break take part in the next system."""
 
-_SOME_ROOM = 0.3
-"""Room that a row which is broken at the start is given, as a share of what it has at a point inside."""
-
-_MISSED = 0.1
-"""The iteration goes on while a row misses its bound by more than this share of its slack."""
-
-_LINEAR_TOLERANCE = 1e-3
+_LINEAR_TOLERANCE = 1e-2
 _LINEAR_STEPS = 150
 _DIRECT_UP_TO = 4000
 _ROUNDS = 60
 
 Vector = NDArray[np.float64]
+MoreRows = Callable[[Vector, Vector], tuple[sp.csr_array, Vector]]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -60,13 +65,12 @@ def minimise(
     form: sp.csr_array,
     pull: Vector,
     *,
-    inside: Vector,
+    start: Vector,
     lower: Vector,
     upper: Vector,
     rows: sp.csr_array,
     bound: Vector,
-    start: Vector | None = None,
-    barrier: float = 0.3,
+    more_rows: MoreRows,
     accuracy: float = 0.03,
 ) -> Minimum:
     """Minimise x' H x / 2 - pull' x  subject to  lower <= x <= upper  and  R x >= bound.
@@ -80,18 +84,17 @@ def minimise(
     form : (n, n) sparse float64
         H, positive semi-definite, and definite together with the bounds.
     pull : (n,) float64
-    inside : (n,) float64
+    start : (n,) float64
         Strictly inside all constraints.
     lower, upper : (n,) float64
         Infinite where there is no bound.
     rows : (p, n) sparse float64
         R.
     bound : (p,) float64
-    start : (n,) float64, optional
-        Where to start, strictly between the bounds. Rows that it breaks are reached on the way; what is
-        missing in the end is made up for by going back towards `inside`. `inside` itself where omitted.
-    barrier : float
-        Complementarity at the start, as a share of x' H x / 2.
+    more_rows : callable
+        Given an x and one that it has accepted, returns further rows and bounds that the first breaks and the
+        second fulfils, none when all is well. Asked now and then, and at the end: what it accepted last is
+        returned. `start` counts as accepted.
     accuracy : float
         Gap between the objective and its dual, as a share of x' H x / 2, at which the iteration stops.
 
@@ -100,12 +103,7 @@ def minimise(
     Minimum
     """
     with threadpool_limits(limits=1):  # sums that do not depend on the number of threads
-        first = inside if start is None else start
-        iteration = _Iteration(form, pull, first, lower, upper, rows, bound)
-        iteration.begin(rows @ inside - bound, barrier)
-        iteration.run(accuracy)
-    x = _pulled_back(iteration.x, inside, rows, bound)
-    return Minimum(x=x, rounds=iteration.rounds, watched=int(iteration.watched.sum()), gap=iteration.share)
+        return _Iteration(form, pull, start, lower, upper, rows, bound).run(accuracy, more_rows)
 
 
 class _Iteration:
@@ -127,20 +125,11 @@ class _Iteration:
         self.lower, self.upper = lower[self.at_lower], upper[self.at_upper]
         self.rows, self.bound = rows, bound
         self.watched = np.zeros(len(bound), dtype=bool)
-        self.missing = np.zeros(len(bound))
-        self.rounds = 0
-        self.share = np.inf
-
-    def begin(self, room: Vector, barrier: float) -> None:
-        """Set slacks and forces; `room` (p,) is what the rows have at a point inside."""
-        here = self.rows @ self.x - self.bound
-        broken = here < _SOME_ROOM * room
-        self.missing = np.where(broken, here - _SOME_ROOM * room, 0.0)
-        self.watched |= broken
         self.slack = self._slacks()
-        count = len(self.at_lower) + len(self.at_upper) + int(broken.sum())
-        self.barrier = barrier * self._energy() / max(count, 1)
+        count = len(self.at_lower) + len(self.at_upper)
+        self.barrier = _FIRST_BARRIER * self._energy() / max(count, 1)
         self.force = [self.barrier / slack for slack in self.slack]
+        self.rounds = 0
 
     def _energy(self) -> float:
         x = self.x
@@ -151,25 +140,57 @@ class _Iteration:
         return [
             x[self.at_lower] - self.lower,
             self.upper - x[self.at_upper],
-            self.rows @ x - self.bound - self.missing,
+            self.rows @ x - self.bound,
         ]
 
     def _moves(self, step: Vector) -> list[Vector]:
-        return [step[self.at_lower], -step[self.at_upper], self.rows @ step + self.missing]
+        return [step[self.at_lower], -step[self.at_upper], self.rows @ step]
 
-    def run(self, accuracy: float) -> None:
+    def run(self, accuracy: float, more_rows: MoreRows) -> Minimum:
+        accepted, share = self.x, np.inf
+        next_check = _CHECK_EVERY
         while self.rounds < _ROUNDS:
             longest = self._advance()
-            gap = sum(
-                float(slack @ force)
-                for slack, force in zip(self._taking_part(self.slack), self._taking_part(self.force), strict=True)
-            )
-            self.share = gap / max(self._energy(), 1e-300)
-            if self.share <= accuracy and not (self.missing < -_MISSED * self.slack[2]).any():
-                break
+            gap = self._gap()
+            share = gap / max(self._energy(), 1e-300)
+            close = share <= accuracy
+            if close or self.rounds >= next_check:
+                clean = self._go_back(accepted, *more_rows(self.x, accepted))
+                if close and not clean:
+                    # Back at the rows just found, all may be well already, and almost as good.
+                    enough = (1.0 + accuracy) * self._energy_before
+                    clean = self._go_back(accepted, *more_rows(self.x, accepted))
+                    close = self._energy() <= enough
+                if clean:
+                    accepted = self.x
+                    if close:
+                        break
+                next_check = self.rounds + _CHECK_EVERY
             shrink = 0.1 if longest > 0.6 else 0.3 if longest > 0.3 else 0.6
             count = len(self.at_lower) + len(self.at_upper) + int(self.watched.sum())
-            self.barrier = shrink * gap / count
+            self.barrier = max(shrink * gap, 0.1 * accuracy * self._energy()) / count
+        return Minimum(x=accepted, rounds=self.rounds, watched=int(self.watched.sum()), gap=share)
+
+    def _go_back(self, accepted: Vector, rows: sp.csr_array, bound: Vector) -> bool:
+        """Add rows, and go back towards what was accepted until there is some room to them; tell if none."""
+        if len(bound) == 0:
+            return True
+        self._energy_before = self._energy()
+        here, there = rows @ self.x - bound, rows @ accepted - bound
+        wanted = _SOME_ROOM * there
+        short = here < wanted
+        share = float(((wanted - here)[short] / (there - here)[short]).max(initial=0.0))
+        self.x = self.x + share * (accepted - self.x)
+        self.rows, self.bound = sp.vstack([self.rows, rows]).tocsr(), np.concatenate([self.bound, bound])
+        self.watched = np.concatenate([self.watched, np.ones(len(bound), dtype=bool)])
+        self.slack = self._slacks()
+        new = self.barrier / self.slack[2][len(self.force[2]) :]
+        self.force[2] = np.concatenate([self.force[2], new])
+        return False
+
+    def _gap(self) -> float:
+        pairs = zip(self._taking_part(self.slack), self._taking_part(self.force), strict=True)
+        return sum(float(slack @ force) for slack, force in pairs)
 
     def _taking_part(self, values: list[Vector]) -> list[Vector]:
         return [values[0], values[1], values[2][self.watched]]
@@ -180,7 +201,9 @@ class _Iteration:
             step = self._direction()
             moves = self._moves(step)
             reach = _room(self.slack[2], moves[2])
-            first = min(_room(s, m).min(initial=np.inf) for s, m in zip(self.slack[:2], moves[:2], strict=True))
+            first = min(
+                _room(s, m).min(initial=np.inf) for s, m in zip(self.slack[:2], moves[:2], strict=True)
+            )
             unseen = ~self.watched & (reach < 1.0)
             length = min(1.0, _TO_THE_WALL * min(first, reach.min(initial=np.inf)))
             without = min(1.0, _TO_THE_WALL * min(first, reach[~unseen].min(initial=np.inf)))
@@ -198,7 +221,6 @@ class _Iteration:
         )
         dual = min(1.0, _TO_THE_WALL * dual)
         self.x = self.x + length * step
-        self.missing = (1.0 - length) * self.missing
         self.slack = self._slacks()
         self.force = [force + dual * change for force, change in zip(self.force, changes, strict=True)]
         # What does not take part yet stays on the central path.
@@ -210,7 +232,6 @@ class _Iteration:
         """Solve the Newton system."""
         stiffness = [force / slack for force, slack in zip(self.force, self.slack, strict=True)]
         push = [self.barrier / slack for slack in self.slack]
-        push[2] = push[2] - stiffness[2] * self.missing
         some = np.flatnonzero(self.watched)
         rows = self.rows[some]
         diagonal = np.zeros(len(self.x))
@@ -225,14 +246,6 @@ class _Iteration:
             right = right + rows.T @ push[2][some]
         self.rounds += 1
         return _solve(system.tocsr(), right)
-
-
-def _pulled_back(x: Vector, inside: Vector, rows: sp.csr_array, bound: Vector) -> Vector:
-    """Return the first point on the way from x to the inside that fulfils all rows."""
-    here, there = rows @ x - bound, rows @ inside - bound
-    broken = here < 0.0
-    share = float((here[broken] / (here[broken] - there[broken])).max(initial=0.0))
-    return x + min(1.0, 1.001 * share) * (inside - x)
 
 
 def _room(values: Vector, moves: Vector) -> Vector:

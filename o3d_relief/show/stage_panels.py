@@ -288,7 +288,9 @@ def _bounded(easel: Easel) -> Pictures:
     record = easel.record(BoundedStage)
     faces = easel.record(SceneStage).faces
     corners = np.bincount(faces.ravel(), minlength=len(record.z))
-    weight = np.bincount(faces.ravel(), np.repeat(record.face_weight, 3), len(record.z)) / np.maximum(corners, 1)
+    weight = np.bincount(faces.ravel(), np.repeat(record.face_weight, 3), len(record.z)) / np.maximum(
+        corners, 1
+    )
     counted = render(
         easel.mesh(easel.vertices),
         size=easel.size,
@@ -300,7 +302,12 @@ def _bounded(easel: Easel) -> Pictures:
     after = easel.raised(np.maximum(record.z, 0.0))
     title = f"bounded: depth {np.ptp(easel.vertices[:, 2]):.1f} before, {record.z.max():.1f} after"
     result = render(
-        easel.mesh(after), size=easel.size, direction=_OBLIQUE, plate=True, field=moved, field_label="moved",
+        easel.mesh(after),
+        size=easel.size,
+        direction=_OBLIQUE,
+        plate=True,
+        field=moved,
+        field_label="moved",
         title=title,
     )
     return [counted, result]
