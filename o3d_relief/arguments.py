@@ -182,7 +182,7 @@ def _add_params(command: argparse.ArgumentParser) -> None:
     group = command.add_argument_group("relief")
     add = group.add_argument
     add("--mode", choices=("attenuation", "bounded"),
-        help="the paper's method, or the closest relief of a given depth (default: bounded with --depth)")  # fmt: skip
+        help="the paper's method, or the closest relief of a depth (default: with --depth)")  # fmt: skip
     add("-k", type=int, default=default.k, metavar="N", help="attenuation points (default: %(default)s)")
     add("--beta", type=_beta, default=default.beta, metavar="B[,B...]",
         help="attenuation factor, one or one per point (default: %(default)s)")  # fmt: skip

@@ -185,9 +185,10 @@ class ReliefParams:
     Parameters
     ----------
     mode : "attenuation", "bounded" or None
-        "attenuation" is the paper's method; a `depth` is then met by compression. "bounded" finds the relief
-        of exactly the wanted `depth` that changes what is seen of the surface least; it needs a `depth`, and of
-        the other parameters it uses `min_gap`, `attach` and `weights`. None: bounded where a depth is given.
+        "attenuation" is the paper's method; a `depth` is then met by compression. "bounded" finds the
+        relief of exactly the wanted `depth` that changes what is seen of the surface least; it needs a
+        `depth`, and of the other parameters it uses `min_gap`, `attach` and `weights`. None: bounded where
+        a depth is given.
     k : int
         Number of clusters, and so of attenuation points at most. More points bring more of the scene
         to the plane and lower the depth, at the price of more deformation.

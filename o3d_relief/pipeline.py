@@ -12,6 +12,7 @@ import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
+from o3d_relief.bounded_step import bounded_step
 from o3d_relief.bounds.certificate import Certificate, certify
 from o3d_relief.errors import MeshError, ParameterError
 from o3d_relief.journal import Journal, OnStage
@@ -26,7 +27,6 @@ from o3d_relief.scene.weld import weld
 from o3d_relief.stages.trim import Trimmed
 from o3d_relief.steps import (
     attenuation_step,
-    bounded_step,
     clusters_step,
     compression_step,
     construction_step,

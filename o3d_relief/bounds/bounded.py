@@ -178,7 +178,7 @@ class _Place:
         else:
             result = _onto_plane(z * (self._depth / float(z.max())), self._attach, self._gaps, self._depth)
         # Rounding must not leave anything visible behind S or beyond the depth.
-        return np.minimum(np.where(self._visible, np.maximum(result, 0.0), result), self._depth)
+        return np.asarray(np.minimum(np.where(self._visible, np.maximum(result, 0.0), result), self._depth))
 
 
 def lowest_seen(z: NDArray[np.float64], seen: sp.csr_array, visible: NDArray[np.bool_]) -> float:
@@ -226,5 +226,5 @@ def _onto_plane(
         wrong = np.flatnonzero((gaps @ result <= 0.0) & (gaps @ z > 0.0))
         back = np.intersect1d(gaps[wrong].indices, near[result[near] != z[near]])
         if len(back) == 0:
-            return result
+            return np.asarray(result)
         result[back] = z[back]

@@ -38,18 +38,21 @@ class BetweenLines:
         scene, middle, size = unit_box(vertices, self._faces)
         start, end = vertices[self._edges[:, 0]], vertices[self._edges[:, 1]]
         rays = np.concatenate([(start - middle) / size, (end - start) / size], axis=1)
-        # Rays go on behind the edge's end and meet all that is there: first find those that need a closer look.
+        # Rays go on behind the edge's end and meet all that is there: most need no closer look.
         ahead = rays.copy()
         ahead[:, :3] += _INSIDE * rays[:, 3:]
         nearest = scene.cast_rays(o3d.core.Tensor(ahead.astype(np.float32)))["t_hit"].numpy()
         some = np.flatnonzero(nearest < 1.0 - 2.0 * _INSIDE)
+        if len(some) == 0:  # Open3D ends the process on an empty set of rays
+            return some
         hits = scene.list_intersections(o3d.core.Tensor(rays[some].astype(np.float32)))
         t = hits["t_hit"].numpy()
         inside = (t > _INSIDE) & (t < 1.0 - _INSIDE)
         edge = some[hits["ray_ids"].numpy()[inside].astype(np.int64)]
         face = hits["primitive_ids"].numpy()[inside].astype(np.int64)
         apart = (self._edges[edge][:, :, None] != self._faces[face][:, None, :]).all(axis=(1, 2))
-        return np.asarray(edge * len(self._faces) + face)[apart]
+        found: NDArray[np.int64] = (edge * len(self._faces) + face)[apart]
+        return found
 
     def missed_pairs(self, z: NDArray[np.float64]) -> Pairs:
         """Find what has changed places, and what crosses where nothing crossed before.
@@ -88,8 +91,8 @@ def edge_pairs(
 ) -> Pairs:
     """Pair the ends of the stretch that an edge and a face share, seen from the front.
 
-    The gap between an edge and a face is linear along the edge: it keeps its sign if it does so at the two ends
-    of the stretch, which are ends of the edge or lie where it crosses the outline of the face.
+    The gap between an edge and a face is linear along the edge: it keeps its sign if it does so at the
+    two ends of the stretch, which are ends of the edge or lie where it crosses the face's outline.
 
     Parameters
     ----------
@@ -128,7 +131,7 @@ def edge_pairs(
 def _barycentric(
     vertices: NDArray[np.float64], corners: NDArray[np.int64], points: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the barycentric coordinates of points (q, 2) in faces seen from the front, not finite if edge-on."""
+    """Return the barycentric coordinates of points (q, 2) in faces, not finite where a face is edge-on."""
     a, b, c = vertices[corners][:, :, :2].transpose(1, 0, 2)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         area = _cross(b - a, c - a)

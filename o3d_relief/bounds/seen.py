@@ -59,7 +59,7 @@ def seen_faces(
     faces: NDArray[np.int64], visible: NDArray[np.bool_], face_of_point: NDArray[np.int64]
 ) -> NDArray[np.bool_]:
     """Tell which faces are seen: those with a visible vertex or a seen point, (m,)."""
-    seen = visible[faces].any(axis=1)
+    seen: NDArray[np.bool_] = np.array(visible[faces].any(axis=1))
     seen[face_of_point] = True
     return seen
 

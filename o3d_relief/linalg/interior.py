@@ -75,9 +75,10 @@ def minimise(
 ) -> Minimum:
     """Minimise x' H x / 2 - pull' x  subject to  lower <= x <= upper  and  R x >= bound.
 
-    A primal-dual interior point method, whose iterates lie strictly inside all constraints. Each round solves one linear system, H plus springs on the constraints, by conjugate gradients
-    with smoothed aggregation multigrid, so that time and memory grow linearly. Of the rows only those that
-    a step has come near take part in the systems; all of them limit the steps.
+    A primal-dual interior point method, whose iterates lie strictly inside all constraints. Each round
+    solves one linear system, H plus springs on the constraints, by conjugate gradients with smoothed
+    aggregation multigrid, so that time and memory grow linearly. Of the rows only those that a step has come
+    near take part in the systems; all of them limit the steps.
 
     Parameters
     ----------
@@ -156,7 +157,7 @@ class _Iteration:
             close = share <= accuracy
             if close or self.rounds >= next_check:
                 clean = self._go_back(accepted, *more_rows(self.x, accepted))
-                if close and not clean:
+                if not clean and (close or self.rounds > _ROUNDS // 2):
                     # Back at the rows just found, all may be well already, and almost as good.
                     enough = (1.0 + accuracy) * self._energy_before
                     clean = self._go_back(accepted, *more_rows(self.x, accepted))
@@ -226,7 +227,7 @@ class _Iteration:
         # What does not take part yet stays on the central path.
         self.force[2] = np.where(self.watched, self.force[2], self.barrier / self.slack[2])
         self.force[2] = np.where(self.force[2] > 0.0, self.force[2], self.barrier / self.slack[2])
-        return min(length, dual)
+        return float(min(length, dual))
 
     def _direction(self) -> Vector:
         """Solve the Newton system."""
