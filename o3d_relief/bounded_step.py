@@ -75,7 +75,9 @@ def bounded_step(
         "left": found.left,
         "visible_behind": int((found.z[visible] < 0.0).sum()),
     }
-    return BoundedStage(face_weight=weight, attached=attached, z=on_plane(found.z), counts=counts)
+    return BoundedStage(
+        face_weight=weight, attached=attached, energy_gap=found.gap, z=on_plane(found.z), counts=counts
+    )
 
 
 def _attached(scene: SceneStage, params: ReliefParams) -> NDArray[np.int64]:

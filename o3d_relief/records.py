@@ -257,12 +257,15 @@ class BoundedStage(StageRecord):
         How much a change of each face counts.
     attached : (a,) int64
         Vertices that were to lie on S.
+    energy_gap : float
+        Bound on how far the energy is above its minimum, as a share of it.
     z : (n,) float64
     """
 
     name: ClassVar[str] = "bounded"
     face_weight: NDArray[np.float64]
     attached: NDArray[np.int64]
+    energy_gap: float = 0.0
     z: NDArray[np.float64]
 
 

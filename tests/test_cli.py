@@ -231,6 +231,13 @@ def test_missing_input(tmp_path, capsys):
     )
 
 
+def test_vertices_to_attach_are_whole_numbers(tmp_path, scene, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["make", str(scene), str(tmp_path / "r.ply"), "--depth", "3", "--attach", "1,a"])
+    assert ended.value.code == 2
+    assert "whole numbers" in capsys.readouterr().err
+
+
 def test_input_that_is_no_mesh(tmp_path, capsys):
     path = tmp_path / "letter.ply"
     path.write_text("Dear sculptor,\n")
@@ -289,7 +296,6 @@ def test_outliers_zero_keeps_all():
         (["-k", "999999"], "k must be at most the number of vertices"),
         (["--alpha", "0.5", "--depth", "3"], "exclude each other"),
         (["--mode", "bounded"], "needs a depth"),
-        (["--depth", "3", "--attach", "a"], "whole numbers"),
         (["--depth", "3", "--attach", "99999999"], "attach must be numbers of the mesh's"),
         (["--front", "y"], "parallel"),
         (["--viewpoint", "0,0,3"], "in front of the scene"),

@@ -27,6 +27,9 @@ _HOLD = 1e3
 _HELD = 1e-2
 """Attached vertices that end within this share of the depth of S are set onto it."""
 
+_TOUCH = 2e-3
+"""Surfaces that are closer than this, in relief units, touch."""
+
 _LOOSE = 1e-9
 """Weight that keeps the system definite where nothing else holds a vertex."""
 
@@ -131,9 +134,12 @@ def closest_relief(
     ) -> tuple[sp.csr_array, NDArray[np.float64]]:
         wrong = between.missed_pairs(place(z + x))
         there = np.subtract(*wrong.heights(z + accepted))
-        wrong, there = wrong.select(there > 0.0), there[there > 0.0]
-        added[0] += len(wrong)
-        return gap_rows(wrong, n), np.minimum(_KEPT_GAP * ratio * wrong.gap, there / 2.0) - wrong.gap
+        least = np.minimum(_KEPT_GAP * ratio * wrong.gap, there / 2.0)
+        # What touches has no order; it may turn about the point of contact a little.
+        least = np.where(wrong.gap > _TOUCH, least, -_TOUCH / 4.0)
+        usable = there > least + _TOUCH / 1000.0
+        added[0] += int(usable.sum())
+        return gap_rows(wrong.select(usable), n), (least - wrong.gap)[usable]
 
     found = minimise(
         hessian,
