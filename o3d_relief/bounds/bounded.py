@@ -115,6 +115,7 @@ def closest_relief(
     Bounded
     """
     z, n = vertices[:, 2], len(vertices)
+    pairs = pairs.select(pairs.gap > _TOUCH / 2.0)
     lowest = lowest_seen(z, seen, visible)
     ratio = depth / (float(z.max()) - lowest)
     inside = _MARGIN * depth + (1.0 - 2.0 * _MARGIN) * ratio * (z - lowest) - z
