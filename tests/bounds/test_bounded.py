@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from o3d_relief.bounds.bounded import closest_relief, gap_rows, lowest_seen
-from o3d_relief.bounds.certificate import crossings, inversions
+from o3d_relief.bounds.crossings import crossings, edges_of
 from o3d_relief.bounds.pairs import Pairs, grid_pairs, vertex_pairs
 from o3d_relief.bounds.seen import face_weights, point_rows, seen_faces, seen_points
 from o3d_relief.linalg.laplacian import cotangent_laplacian
@@ -73,8 +73,11 @@ def test_order_is_kept_on_and_between_the_lines(depth):
     found, visible, _, _ = closest((vertices, faces), depth)
     relief = np.column_stack([vertices[:, :2], found.z])
     for pairs in (vertex_pairs(relief, faces), grid_pairs(relief, faces)):
-        assert inversions(relief, pairs, vertices[:, 2]).inverted == 0
-    assert crossings(relief, faces)[0] <= crossings(vertices, faces)[0]
+        upper, lower = pairs.heights(vertices[:, 2])
+        assert (upper - lower > -1e-3).all()
+        assert len(pairs) > 100
+    met = crossings(relief, faces, edges_of(faces))
+    assert not (met.pierced(found.z) & ~met.pierced(vertices[:, 2])).any()
     assert (found.z[visible] >= 0.0).all()
 
 
