@@ -159,7 +159,7 @@ class _Iteration:
                 clean = self._go_back(accepted, *more_rows(self.x, accepted))
                 if not clean and (close or self.rounds > _ROUNDS // 2):
                     # Back at the rows just found, all may be well already, and almost as good.
-                    enough = (1.0 + accuracy) * self._energy_before
+                    enough = (1.0 + 2.0 * accuracy) * self._energy_before
                     clean = self._go_back(accepted, *more_rows(self.x, accepted))
                     close = self._energy() <= enough
                 if clean:
