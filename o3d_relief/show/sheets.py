@@ -214,10 +214,13 @@ def save_stage_pictures(
     if not folder.is_dir():
         raise FileError(f"The folder {str(folder)!r} does not exist.")
     paths = []
-    names = [name for name in [*SCAN_PANELS, *PANELS] if name in stages]
+    names = [*SCAN_PANELS, *PANELS] if SCAN_PANELS.keys() & stages.keys() else [*PANELS]
+    # The bounded mode has a few stages only, the other has all but that one: each is counted by itself.
+    names = [name for name in names if (name in stages if "bounded" in stages else name != "bounded")]
     for number, name in enumerate(names, start=1):
-        paths.append(folder / f"{number:02d}_{name}.png")
-        save_png(paths[-1], stage_picture(name, stages, relief=relief, size=size))
-        if on_picture is not None:
-            on_picture(paths[-1])
+        if name in stages:
+            paths.append(folder / f"{number:02d}_{name}.png")
+            save_png(paths[-1], stage_picture(name, stages, relief=relief, size=size))
+            if on_picture is not None:
+                on_picture(paths[-1])
     return paths

@@ -304,7 +304,7 @@ def _bounded(easel: Easel) -> Pictures:
     result = render(
         easel.mesh(after),
         size=easel.size,
-        direction=_OBLIQUE,
+        direction=OBLIQUE,
         plate=True,
         field=moved,
         field_label="moved",

@@ -268,7 +268,7 @@ def test_the_records_stay_as_they_are(stages):
 def test_saved_pictures_are_numbered_by_stage(stages, tmp_path):
     chosen = {name: stages[name] for name in ("scene", "perspective", "construction")}
     paths = save_stage_pictures(chosen, tmp_path, size=SIZE)
-    assert [path.name for path in paths] == ["01_scene.png", "02_perspective.png", "03_construction.png"]
+    assert [path.name for path in paths] == ["01_scene.png", "02_perspective.png", "06_construction.png"]
     assert sorted(path.name for path in tmp_path.iterdir()) == [path.name for path in paths]
     with Image.open(paths[0]) as picture:
         assert np.array_equal(np.asarray(picture), stage_picture("scene", stages, size=SIZE))
