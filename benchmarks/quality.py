@@ -97,7 +97,7 @@ def made_here(scene: Scene, params: rel.ReliefParams, last: str) -> Made:
 
 def attenuation(scene: Scene, depth: float) -> Made:
     """Run the paper's method, with what the package adds to it and compressed to the depth."""
-    params = rel.ReliefParams(k=128, depth=depth, in_order=not scene.many_parts)
+    params = rel.ReliefParams(mode="attenuation", k=128, depth=depth, in_order=not scene.many_parts)
     return made_here(scene, params, "compression")
 
 
@@ -118,6 +118,9 @@ METHODS: dict[str, Callable[[Scene, float], Made | None]] = {
     ),
     "Schueller": mimicking,
     "attenuation": attenuation,
+    "bounded": lambda scene, depth: made_here(
+        scene, rel.ReliefParams(mode="bounded", depth=depth), "bounded"
+    ),
 }
 
 

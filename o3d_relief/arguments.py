@@ -75,6 +75,15 @@ def _numbers(text: str) -> tuple[float, ...]:
         ) from None
 
 
+def _integers(text: str) -> tuple[int, ...]:
+    try:
+        return tuple(int(item) for item in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"must be whole numbers with commas between them. Got {text!r} instead."
+        ) from None
+
+
 def _point(text: str) -> tuple[float, ...]:
     numbers = _numbers(text)
     if len(numbers) != 3:
@@ -172,6 +181,8 @@ def _add_params(command: argparse.ArgumentParser) -> None:
     default = ReliefParams()
     group = command.add_argument_group("relief")
     add = group.add_argument
+    add("--mode", choices=("attenuation", "bounded"),
+        help="the paper's method, or the closest relief of a depth (default: with --depth)")  # fmt: skip
     add("-k", type=int, default=default.k, metavar="N", help="attenuation points (default: %(default)s)")
     add("--beta", type=_beta, default=default.beta, metavar="B[,B...]",
         help="attenuation factor, one or one per point (default: %(default)s)")  # fmt: skip
@@ -193,7 +204,9 @@ def _add_params(command: argparse.ArgumentParser) -> None:
         help="smallest gap in depth between parts, in the input's unit (default: %(default)s)")  # fmt: skip
     add("--alpha", type=float, metavar="A", help="largest compression ratio (default: no compression)")
     add("--alpha-min", type=float, metavar="A", help="smallest compression ratio (default: half of alpha)")
-    add("--depth", type=float, metavar="D", help="exact depth in the input's unit, instead of alpha")
+    add("--depth", type=float, metavar="D", help="exact depth in the input's unit")
+    add("--attach", type=_integers, default=(), metavar="N[,N...]",
+        help="vertices to hold on the plane, bounded mode only")  # fmt: skip
     add("--seed", type=int, default=default.seed, metavar="N", help="default: %(default)s")
 
 
@@ -292,5 +305,5 @@ def chosen_params(options: argparse.Namespace) -> ReliefParams:
     ParameterError
         A value out of its range.
     """
-    names = ReliefParams.__dataclass_fields__
+    names = [name for name in ReliefParams.__dataclass_fields__ if name != "weights"]  # one for each vertex
     return ReliefParams(**{name: getattr(options, name) for name in names})

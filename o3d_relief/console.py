@@ -63,10 +63,16 @@ def write_stages(folder: Path, relief: Relief) -> None:
 def tell_result(path: Path, relief: Relief, seconds: float, *, solid: bool = False) -> None:
     """Write what came out."""
     report = relief.summary()
-    if relief.stages["compression"].counts.get("already_shallower"):
+    counts = {name: count for record in relief.stages.values() for name, count in record.counts.items()}
+    if counts.get("already_shallower"):
         tell(f"the relief is {report['relief_depth']:.4g} deep, less than was asked for: it is not stretched")
-    if left := relief.stages["order"].counts.get("left", 0):
-        tell(f"{left} pairs of surfaces could not be brought back into order; a smaller k may help")
+    if left := counts.get("left", 0):
+        if relief.params.bounded:
+            tell(f"{left} gaps are smaller than asked for: the depth has no room for them")
+        else:
+            tell(f"{left} pairs of surfaces could not be brought back into order; a smaller k may help")
+    if missed := counts.get("attached_missed", 0):
+        tell(f"{missed} vertices could not be attached to the plane: something seen lies behind them")
     if solid:
         tell(f"{path}: the solid, {seconds:.1f} s in all")
         return

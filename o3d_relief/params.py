@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Any
 
 from o3d_relief.errors import ParameterError
@@ -86,6 +87,29 @@ def _check_beta(value: float | Sequence[float]) -> float | tuple[float, ...]:
     return tuple(check_range("beta", item, 0.0) for item in items)
 
 
+def _check_indices(name: str, values: object) -> tuple[int, ...]:
+    try:
+        items: tuple[object, ...] = () if isinstance(values, str) else tuple(values)  # type: ignore[arg-type]
+    except TypeError:
+        items = (None,)
+    if isinstance(values, str) or any(
+        isinstance(item, bool) or not isinstance(item, Integral) or item < 0 for item in items
+    ):
+        raise ParameterError(f"{name} must be numbers of vertices, each at least 0. Got {values!r} instead.")
+    return tuple(int(item) for item in items)  # type: ignore[call-overload]
+
+
+def _check_weights(name: str, values: object) -> tuple[float, ...]:
+    try:
+        items = tuple(float(item) for item in values)  # type: ignore[attr-defined]
+    except (TypeError, ValueError):
+        raise ParameterError(f"{name} must be one number for each vertex. Got {values!r} instead.") from None
+    wrong = [item for item in items if not 0.0 < item < math.inf]
+    if wrong:
+        raise ParameterError(f"{name} must be finite and greater than 0. Got {wrong[0]!r} instead.")
+    return items
+
+
 @dataclass(frozen=True, kw_only=True)
 class View:
     """How the scene is looked at.
@@ -146,12 +170,25 @@ class View:
             )
 
 
+_PAPER: dict[str, Any] = {
+    "mode": "attenuation",
+    "smooth_points": False,
+    "in_front": False,
+    "in_order": False,
+}
+
+
 @dataclass(frozen=True, kw_only=True)
 class ReliefParams:
     """The parameters of the method.
 
     Parameters
     ----------
+    mode : "attenuation", "bounded" or None
+        "attenuation" is the paper's method; a `depth` is then met by compression. "bounded" finds the
+        relief of exactly the wanted `depth` that changes what is seen of the surface least; it needs a
+        `depth`, and of the other parameters it uses `min_gap`, `attach` and `weights`. None: bounded where
+        a depth is given.
     k : int
         Number of clusters, and so of attenuation points at most. More points bring more of the scene
         to the plane and lower the depth, at the price of more deformation.
@@ -171,8 +208,8 @@ class ReliefParams:
     alpha_min : float, optional
         The smallest compression ratio, in (0, alpha]. None: half of the largest.
     depth : float, optional
-        Wanted depth of the relief above the plane, in the input's unit; the compression is chosen to
-        meet it exactly. A relief that is shallower already is left as it is. Excludes `alpha`.
+        Wanted depth of the relief above the plane, in the input's unit, met exactly. A scene, or a relief
+        before its compression, that is shallower already is left as it is. Excludes `alpha`.
     smooth_points : bool
         Also restore a disc around every kept attenuation point, which removes the small pimples that
         the paper's own rule (False) leaves there.
@@ -186,6 +223,11 @@ class ReliefParams:
         Smallest gap along the viewing direction between surfaces one behind the other, in the input's
         unit, so that they do not fuse in print. Gaps that were smaller before stay as they are at least.
         Needs `in_order`.
+    attach : sequence of int
+        Input vertices that are to lie on the relief plane; bounded mode only.
+    weights : sequence of float, optional
+        One for each input vertex, greater than 0: how much the surface there is to keep its shape, against 1
+        for the rest (10 on a face keeps the face). Bounded mode only.
     seed : int
         Seed of the clustering.
 
@@ -200,6 +242,7 @@ class ReliefParams:
     12.0
     """
 
+    mode: str | None = None
     k: int = 128
     beta: float | Sequence[float] = 0.2
     discard_above: float = 0.6
@@ -213,6 +256,8 @@ class ReliefParams:
     in_front: bool = True
     in_order: bool = True
     min_gap: float = 0.0
+    attach: Sequence[int] = ()
+    weights: Sequence[float] | None = None
     seed: int = 0
 
     @classmethod
@@ -229,7 +274,7 @@ class ReliefParams:
         >>> ReliefParams.paper(k=64).in_order
         False
         """
-        return cls(**{"smooth_points": False, "in_front": False, "in_order": False, **values})
+        return cls(**{**_PAPER, **values})
 
     def __post_init__(self) -> None:
         set_field = object.__setattr__
@@ -250,6 +295,31 @@ class ReliefParams:
             raise ParameterError("min_gap needs in_order: a gap cannot be kept where the order is not.")
         set_field(self, "seed", _check_integer("seed", self.seed, 0, 2**32 - 1))
         self._check_compression()
+        self._check_mode()
+
+    @property
+    def bounded(self) -> bool:
+        """Whether the relief is made by the bounded mode."""
+        return self.mode == "bounded" or (self.mode is None and self.depth is not None)
+
+    def _check_mode(self) -> None:
+        if self.mode not in (None, "attenuation", "bounded"):
+            raise ParameterError(f'mode must be "attenuation" or "bounded". Got {self.mode!r} instead.')
+        object.__setattr__(self, "attach", _check_indices("attach", self.attach))
+        if self.weights is not None:
+            object.__setattr__(self, "weights", _check_weights("weights", self.weights))
+        if not self.bounded:
+            if self.attach or self.weights is not None:
+                name = "attach" if self.attach else "weights"
+                raise ParameterError(f'{name} needs mode="bounded" and a depth.')
+            return
+        if self.depth is None:
+            raise ParameterError('mode="bounded" needs a depth.')
+        if self.alpha_min is not None:
+            raise ParameterError('alpha_min needs mode="attenuation": the bounded mode does not compress.')
+        if not (self.in_front and self.in_order):
+            name = "in_order" if self.in_front else "in_front"
+            raise ParameterError(f'{name}=False needs mode="attenuation": the bounded mode always keeps it.')
 
     def _check_compression(self) -> None:
         if self.alpha is not None and self.depth is not None:

@@ -12,13 +12,14 @@ import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
+from o3d_relief.bounded_step import bounded_step
 from o3d_relief.bounds.certificate import Certificate, certify
 from o3d_relief.errors import MeshError, ParameterError
 from o3d_relief.journal import Journal, OnStage
 from o3d_relief.linalg.laplacian import cotangent_laplacian
 from o3d_relief.output import trimmed_mesh
 from o3d_relief.params import ReliefParams, View
-from o3d_relief.records import StageRecord, TrimStage
+from o3d_relief.records import StageRecord, TrimStage, final_heights
 from o3d_relief.scan_params import ScanParams
 from o3d_relief.scene.convert import mesh_arrays
 from o3d_relief.scene.scan import scan_points
@@ -105,9 +106,9 @@ class Relief:
             relief_parents=scene.welded_index[self.trimmed.parents[welded.face_from]],
             scene=stages["perspective"].vertices,
             scene_faces=scene.faces,
-            heights=stages["compression"].z,
+            heights=final_heights(stages),
             visible=stages["visibility"].visible,
-            points=stages["attenuation"].kept_index,
+            points=stages["bounded"].attached if self.params.bounded else stages["attenuation"].kept_index,
             min_gap=self.params.min_gap / scene.unit,
         )
 
@@ -133,10 +134,11 @@ class Relief:
             trim, and the time and counts of each stage.
         """
         stages: dict[str, Any] = dict(self.stages)
-        scene, z, visible = stages["scene"], stages["compression"].z, stages["visibility"].visible
+        scene, z, visible = stages["scene"], final_heights(stages), stages["visibility"].visible
         before = scene.vertices[:, 2]
         return {
-            "params": asdict(self.params),
+            "params": {name: value for name, value in asdict(self.params).items() if name != "weights"},
+            "mode": "bounded" if self.params.bounded else "attenuation",
             "view": asdict(self.view),
             "scan": None if self.scan is None else asdict(self.scan),
             "unit": scene.unit,
@@ -220,16 +222,19 @@ def make_relief(
     faces = scene.faces
     vertices = journal.keep(perspective_step(scene.vertices, view)).vertices
     visible = journal.keep(visibility_step(vertices, faces, view)).visible
-    clusters = journal.keep(clusters_step(vertices, params))
-    points = journal.keep(attenuation_step(vertices, visible, clusters, params))
     laplacian, slivers = cotangent_laplacian(vertices, faces)
-    pairs = stacked_pairs(vertices, faces, params)
-    z = journal.keep(
-        construction_step(vertices, faces, visible, laplacian, slivers, clusters, points, pairs)
-    ).z
-    z = journal.keep(restoration_step(vertices, visible, laplacian, z, clusters, points, params)).z
-    z = journal.keep(order_step(vertices, faces, visible, laplacian, z, pairs, params, scene.unit)).z
-    z = journal.keep(compression_step(z, params, scene.unit)).z
+    if params.bounded:
+        z = journal.keep(bounded_step(vertices, faces, visible, scene, params)).z
+    else:
+        clusters = journal.keep(clusters_step(vertices, params))
+        points = journal.keep(attenuation_step(vertices, visible, clusters, params))
+        pairs = stacked_pairs(vertices, faces, params)
+        z = journal.keep(
+            construction_step(vertices, faces, visible, laplacian, slivers, clusters, points, pairs)
+        ).z
+        z = journal.keep(restoration_step(vertices, visible, laplacian, z, clusters, points, params)).z
+        z = journal.keep(order_step(vertices, faces, visible, laplacian, z, pairs, params, scene.unit)).z
+        z = journal.keep(compression_step(z, params, scene.unit)).z
 
     out_faces, turned = turned_to_viewer(in_faces, scene, vertices, visible, laplacian)
     trimmed = trim_step(in_vertices, out_faces, frame, scene, vertices, z)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 __all__ = [
     "AttenuationStage",
+    "BoundedStage",
     "ClustersStage",
     "CompressionStage",
     "ConstructionStage",
@@ -27,6 +28,7 @@ __all__ = [
     "StageRecord",
     "TrimStage",
     "VisibilityStage",
+    "final_heights",
 ]
 
 
@@ -246,7 +248,35 @@ class CompressionStage(StageRecord):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class BoundedStage(StageRecord):
+    """The closest relief of the wanted depth, in bounded mode.
+
+    Attributes
+    ----------
+    face_weight : (m,) float64
+        How much a change of each face counts.
+    attached : (a,) int64
+        Vertices that were to lie on S.
+    energy_gap : float
+        Bound on how far the energy is above its minimum, as a share of it.
+    z : (n,) float64
+    """
+
+    name: ClassVar[str] = "bounded"
+    face_weight: NDArray[np.float64]
+    attached: NDArray[np.int64]
+    energy_gap: float = 0.0
+    z: NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class TrimStage(StageRecord):
     """The cut at the relief plane; its counts say what was kept."""
 
     name: ClassVar[str] = "trim"
+
+
+def final_heights(stages: Mapping[str, StageRecord]) -> NDArray[np.float64]:
+    """Return the heights (n,) that the cut was made at, in relief units, of a run in either mode."""
+    last: Any = stages[BoundedStage.name if BoundedStage.name in stages else CompressionStage.name]
+    return np.asarray(last.z)

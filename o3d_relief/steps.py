@@ -82,7 +82,7 @@ def scene_step(
     welded = weld(to_relief_units(in_vertices, frame, on_grid=True), in_faces)
     if len(welded.faces) == 0:
         raise MeshError(f"None of the {len(in_faces)} triangles of the mesh has three different corners.")
-    if params.k > len(welded.vertices):
+    if not params.bounded and params.k > len(welded.vertices):
         raise ParameterError(
             f"k must be at most the number of vertices, {len(welded.vertices)} after welding. "
             f"Got {params.k} instead: give a smaller k."
@@ -290,7 +290,7 @@ def order_step(
 ) -> OrderStage:
     """Keep everything in order along the viewing direction."""
     if pairs is None:
-        return OrderStage(z=_on_plane(z))
+        return OrderStage(z=on_plane(z))
     # The compression comes later and shrinks gaps, at most by its smallest ratio.
     ratio, lowest = _ratios(z, params, unit)
     min_gap = params.min_gap / unit / (0.95 * lowest if ratio < 1.0 else 1.0)
@@ -310,10 +310,10 @@ def order_step(
         "left": ordered.left,
         "visible_behind": _behind(ordered.z, visible),
     }
-    return OrderStage(z=_on_plane(ordered.z), counts=counts)
+    return OrderStage(z=on_plane(ordered.z), counts=counts)
 
 
-def _on_plane(z: NDArray[np.float64]) -> NDArray[np.float64]:
+def on_plane(z: NDArray[np.float64]) -> NDArray[np.float64]:
     """Set onto S what lies within rounding errors of it."""
     return np.where(np.abs(z) < _ON_PLANE, 0.0, z)
 

@@ -62,6 +62,8 @@ def test_report_says_what_happened(tmp_path, scene):
         "0.3",
         "--depth",
         "20",
+        "--mode",
+        "attenuation",
         "--report",
         str(report),
     ]
@@ -115,6 +117,7 @@ def test_every_option_reaches_the_relief(tmp_path, scene):
     assert values["params"] == {
         "k": 8, "beta": [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8], "discard_above": 0.9, "attach_below": 0.1,
         "max_order_error": 0.4, "blend": 0.5, "alpha": 0.7, "alpha_min": 0.2, "depth": None,
+        "mode": None, "attach": [],
         "smooth_points": False, "in_front": False, "in_order": False, "min_gap": 0.0, "seed": 3,
     }  # fmt: skip
     assert values["view"]["viewpoint"] == [0, 0, 900]
@@ -155,8 +158,38 @@ def test_larger_than_accepted(tmp_path, scene, capsys):
     assert _files(tmp_path) == ["scene.ply"]
 
 
+def test_a_depth_alone_means_the_bounded_mode(tmp_path, scene, capsys):
+    report = tmp_path / "report.json"
+    out = tmp_path / "relief.ply"
+    words = ["make", str(scene), str(out), "--depth", "15", "--attach", "3,40", "--report", str(report)]
+    assert main([*words, "--strict"]) == 0
+    values = json.loads(report.read_text())
+    assert values["mode"] == "bounded"
+    assert values["params"]["attach"] == [3, 40]
+    assert list(values["stages"]) == ["scene", "perspective", "visibility", "bounded", "trim"]
+    assert np.asarray(read_mesh(out).vertices)[:, 2].max() == pytest.approx(15.0)
+    assert values["certificate"]["failures"] == []
+    assert main([*words[:3], "--depth", "1e6"]) == 0
+    assert "less than was asked for" in capsys.readouterr().err
+
+
 def test_deeper_than_it_is(tmp_path, scene, capsys):
-    assert main(["make", str(scene), str(tmp_path / "r.ply"), "-k", "8", "--depth", "1e6"]) == 0
+    assert (
+        main(
+            [
+                "make",
+                str(scene),
+                str(tmp_path / "r.ply"),
+                "-k",
+                "8",
+                "--depth",
+                "1e6",
+                "--mode",
+                "attenuation",
+            ]
+        )
+        == 0
+    )
     assert "less than was asked for" in capsys.readouterr().err
 
 
@@ -196,6 +229,13 @@ def test_missing_input(tmp_path, capsys):
     assert "nothing.ply does not exist" in _fails(
         capsys, "make", tmp_path / "nothing.ply", tmp_path / "r.ply"
     )
+
+
+def test_vertices_to_attach_are_whole_numbers(tmp_path, scene, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["make", str(scene), str(tmp_path / "r.ply"), "--depth", "3", "--attach", "1,a"])
+    assert ended.value.code == 2
+    assert "whole numbers" in capsys.readouterr().err
 
 
 def test_input_that_is_no_mesh(tmp_path, capsys):
@@ -255,6 +295,8 @@ def test_outliers_zero_keeps_all():
         (["-k", "0"], "k must be at least 1"),
         (["-k", "999999"], "k must be at most the number of vertices"),
         (["--alpha", "0.5", "--depth", "3"], "exclude each other"),
+        (["--mode", "bounded"], "needs a depth"),
+        (["--depth", "3", "--attach", "99999999"], "attach must be numbers of the mesh's"),
         (["--front", "y"], "parallel"),
         (["--viewpoint", "0,0,3"], "in front of the scene"),
         (["--vanishing-point", "0,0,3"], "behind the relief plane"),

@@ -32,6 +32,20 @@ from o3d_relief import ParameterError, ReliefParams, View
         ({"min_gap": 1, "in_order": False}, "min_gap needs in_order"),
         ({"in_front": None}, "in_front must be True or False"),
         ({"seed": -1}, "seed must be at least 0"),
+        ({"mode": "flat"}, 'mode must be "attenuation" or "bounded"'),
+        ({"mode": "bounded"}, 'mode="bounded" needs a depth'),
+        ({"mode": "bounded", "alpha": 0.5}, 'mode="bounded" needs a depth'),
+        ({"depth": 3, "alpha_min": 0.5}, "alpha_min needs mode"),
+        ({"depth": 3, "in_order": False}, "in_order=False needs mode"),
+        ({"depth": 3, "in_front": False}, "in_front=False needs mode"),
+        ({"attach": [1]}, "attach needs mode"),
+        ({"weights": [1]}, "weights needs mode"),
+        ({"depth": 3, "attach": [-1]}, "attach must be numbers of vertices"),
+        ({"depth": 3, "attach": [1.5]}, "attach must be numbers of vertices"),
+        ({"depth": 3, "attach": "12"}, "attach must be numbers of vertices"),
+        ({"depth": 3, "attach": 5}, "attach must be numbers of vertices"),
+        ({"depth": 3, "weights": [0.0]}, "weights must be finite and greater than 0"),
+        ({"depth": 3, "weights": "no"}, "weights must be one number for each vertex"),
     ],
 )
 def test_wrong_parameters_are_named(values, words):
@@ -71,6 +85,14 @@ def test_numpy_values_are_taken_as_plain_numbers():
     assert params.beta == (0.1, 0.3)
     assert ReliefParams(beta=np.array(0.4)).beta == 0.4
     assert View(front=(0, 0, 1e-200)).front == View(front=(0, 0, 1e200)).front == (0.0, 0.0, 1.0)
+
+
+def test_a_depth_chooses_the_mode():
+    assert not ReliefParams().bounded
+    assert ReliefParams(depth=3).bounded
+    assert not ReliefParams(depth=3, mode="attenuation").bounded
+    assert not ReliefParams.paper(depth=3).bounded
+    assert ReliefParams(depth=3, attach=np.array([4, 2])).attach == (4, 2)
 
 
 def test_parameters_cannot_be_changed():

@@ -258,13 +258,13 @@ def test_one_point_only_shifts_the_scene(mesh):
 
 @pytest.mark.parametrize("depth", [3.0, 12.5])
 def test_depth_is_exact(mesh, depth):
-    relief = rel.make_relief(mesh, rel.ReliefParams(k=24, depth=depth))
+    relief = rel.make_relief(mesh, rel.ReliefParams(k=24, depth=depth, mode="attenuation"))
     assert np.asarray(relief.mesh.vertices)[:, 2].max() == pytest.approx(depth, rel=1e-9)
     assert relief.stages["compression"].counts["already_shallower"] == 0
 
 
 def test_shallower_relief_than_asked_for_is_left_alone(mesh, relief):
-    again = rel.make_relief(mesh, rel.ReliefParams(k=24, depth=1000))
+    again = rel.make_relief(mesh, rel.ReliefParams(k=24, depth=1000, mode="attenuation"))
     assert again.stages["compression"].counts["already_shallower"] == 1
     assert np.array_equal(np.asarray(again.mesh.vertices), np.asarray(relief.mesh.vertices))
 

@@ -124,3 +124,13 @@ def test_certificate_of_single_bodies_is_clean(reliefs, name):
     certificate = reliefs(name).certificate
     assert certificate.failures == []
     assert certificate.grid_pairs_tested > 50_000
+
+
+@pytest.mark.parametrize("share", [0.5, 0.25, 0.1, 0.05])
+@pytest.mark.parametrize("name", [name for name in MESHES if "city" not in name])
+def test_bounded_reliefs_are_as_deep_as_asked_for_and_clean(reliefs, data_folder, name, share):
+    view = reliefs(name).view
+    depth = share * reliefs(name).summary()["scene_visible_depth"]
+    relief = rel.make_relief(rel.read_mesh(data_folder / name), rel.ReliefParams(depth=depth), view=view)
+    assert np.asarray(relief.mesh.vertices)[:, 2].max() == pytest.approx(depth, rel=1e-3)
+    assert relief.certificate.failures == []

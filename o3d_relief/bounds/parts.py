@@ -63,6 +63,8 @@ def tie_parts(
     index: NDArray[np.int64],
     pairs: Pairs,
     shrink: NDArray[np.float64],
+    *,
+    across_gaps: float = _ACROSS_GAPS,
 ) -> Ties | None:
     """Tie the connected components of a mesh to each other.
 
@@ -79,6 +81,8 @@ def tie_parts(
         What is stacked on vertical lines, of one component or of two.
     shrink : (p,) float64
         The gap that each pair would have if empty space were attenuated like a differential.
+    across_gaps : float
+        Stiffness of a spring across a gap, against cotangent weights of about 1.
 
     Returns
     -------
@@ -98,7 +102,7 @@ def tie_parts(
 
     held = np.isin(label, label[index])
     rows = sp.vstack([apart.difference(n), touching.difference(n), _edge_rows(strays, n)]).tocsr()
-    stiffness = np.repeat([_ACROSS_GAPS, _IN_CONTACT, _IN_CONTACT], [len(apart), len(touching), len(strays)])
+    stiffness = np.repeat([across_gaps, _IN_CONTACT, _IN_CONTACT], [len(apart), len(touching), len(strays)])
     change = np.concatenate([shrink[across] - apart.gap, np.zeros(len(touching) + len(strays))])
     loose = np.concatenate(
         [

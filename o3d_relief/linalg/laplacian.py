@@ -60,7 +60,12 @@ def mended_cotangents(
     return cotangents, int(sliver.sum())
 
 
-def cotangent_laplacian(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> tuple[sp.csr_array, int]:
+def cotangent_laplacian(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    *,
+    weights: NDArray[np.float64] | None = None,
+) -> tuple[sp.csr_array, int]:
     """Assemble the symmetric cotangent Laplacian C.
 
     C_ij = -(cot a_ij + cot b_ij) / 2 off the diagonal and rows that sum to zero: the weights of
@@ -72,6 +77,8 @@ def cotangent_laplacian(vertices: NDArray[np.float64], faces: NDArray[np.int64])
     ----------
     vertices : (n, 3) float64
     faces : (m, 3) int64
+    weights : (m,) float64, optional
+        Factor of the cotangents of each face; 1 where omitted.
 
     Returns
     -------
@@ -81,6 +88,8 @@ def cotangent_laplacian(vertices: NDArray[np.float64], faces: NDArray[np.int64])
         Number of triangles that were mended, see `mended_cotangents`.
     """
     cotangents, slivers = mended_cotangents(vertices, faces)
+    if weights is not None:
+        cotangents = cotangents * weights[:, None]
     n = len(vertices)
     start = faces[:, [1, 2, 0]].ravel()
     end = faces[:, [2, 0, 1]].ravel()

@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from o3d_relief.errors import SolverError
 
-__all__ = ["solve_direct", "solve_spd"]
+__all__ = ["multigrid", "solve_direct", "solve_spd"]
 
 _DIRECT_UP_TO = 4000
 _MAX_ITERATIONS = 1000
@@ -107,25 +107,40 @@ def _with_small_indices(matrix: sp.csr_array) -> sp.csr_matrix:
     return sp.csr_matrix(parts, shape=matrix.shape)
 
 
-def _multigrid(
-    matrix: sp.csr_array, right_hand_side: NDArray[np.float64], similar: sp.csr_array, tolerance: float
-) -> NDArray[np.float64]:
+def multigrid(matrix: sp.csr_array) -> sla.LinearOperator:
+    """Build a preconditioner for a sparse symmetric positive definite matrix.
+
+    Parameters
+    ----------
+    matrix : (n, n) sparse float64
+
+    Returns
+    -------
+    LinearOperator
+        One V-cycle of smoothed aggregation multigrid.
+    """
     # "local" weighting bounds the spectral radius row by row; pyamg's default estimates it from a random
     # vector, which would change the last digits from run to run.
     hierarchy = pyamg.smoothed_aggregation_solver(
-        _with_small_indices(similar),
+        _with_small_indices(matrix),
         strength=None,
         improve_candidates=None,
         smooth=("jacobi", {"weighting": "local"}),
         coarse_solver="splu",
         max_coarse=500,
     )
+    return hierarchy.aspreconditioner()
+
+
+def _multigrid(
+    matrix: sp.csr_array, right_hand_side: NDArray[np.float64], similar: sp.csr_array, tolerance: float
+) -> NDArray[np.float64]:
     solution, _ = sla.cg(
         matrix,
         right_hand_side,
         rtol=tolerance,
         atol=0.0,
         maxiter=_MAX_ITERATIONS,
-        M=hierarchy.aspreconditioner(),
+        M=multigrid(similar),
     )
     return np.asarray(solution, dtype=np.float64)

@@ -215,6 +215,8 @@ def save_stage_pictures(
         raise FileError(f"The folder {str(folder)!r} does not exist.")
     paths = []
     names = [*SCAN_PANELS, *PANELS] if SCAN_PANELS.keys() & stages.keys() else [*PANELS]
+    # The bounded mode has a few stages only, the other has all but that one: each is counted by itself.
+    names = [name for name in names if (name in stages if "bounded" in stages else name != "bounded")]
     for number, name in enumerate(names, start=1):
         if name in stages:
             paths.append(folder / f"{number:02d}_{name}.png")

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from o3d_relief.errors import ParameterError
 from o3d_relief.records import (
     AttenuationStage,
+    BoundedStage,
     ClustersStage,
     CompressionStage,
     ConstructionStage,
@@ -22,6 +23,7 @@ from o3d_relief.records import (
     StageRecord,
     TrimStage,
     VisibilityStage,
+    final_heights,
 )
 from o3d_relief.show.camera import view_direction
 from o3d_relief.show.colors import label_colors
@@ -281,11 +283,41 @@ def _compression(easel: Easel) -> Pictures:
     ]
 
 
+def _bounded(easel: Easel) -> Pictures:
+    """Draw how much each place counts on the left, and how far it has moved on the right."""
+    record = easel.record(BoundedStage)
+    faces = easel.record(SceneStage).faces
+    corners = np.bincount(faces.ravel(), minlength=len(record.z))
+    weight = np.bincount(faces.ravel(), np.repeat(record.face_weight, 3), len(record.z)) / np.maximum(
+        corners, 1
+    )
+    counted = render(
+        easel.mesh(easel.vertices),
+        size=easel.size,
+        field=weight,
+        field_label="weight",
+        title="how much a change counts",
+    )
+    moved = record.z - easel.vertices[:, 2]
+    after = easel.raised(np.maximum(record.z, 0.0))
+    title = f"bounded: depth {np.ptp(easel.vertices[:, 2]):.1f} before, {record.z.max():.1f} after"
+    result = render(
+        easel.mesh(after),
+        size=easel.size,
+        direction=OBLIQUE,
+        plate=True,
+        field=moved,
+        field_label="moved",
+        title=title,
+    )
+    return [counted, result]
+
+
 def _trim(easel: Easel) -> Pictures:
     easel.record(TrimStage)
     mesh = easel.relief
     if mesh is None:
-        mesh = easel.mesh(easel.raised(easel.record(CompressionStage).z))
+        mesh = easel.mesh(easel.raised(final_heights(easel.stages)))
     return [
         render(mesh, size=easel.size, plate=True, title="the relief"),
         render(mesh, size=easel.size, direction=OBLIQUE, plate=True, title="from the side"),
@@ -302,6 +334,7 @@ PANELS: Mapping[str, Callable[[Easel], Pictures]] = {
     "restoration": _restoration,
     "order": _order,
     "compression": _compression,
+    "bounded": _bounded,
     "trim": _trim,
 }
 """What draws each stage, in the order of the stages."""

@@ -10,6 +10,7 @@ from PIL import Image
 from o3d_relief.errors import FileError, ParameterError
 from o3d_relief.records import (
     AttenuationStage,
+    BoundedStage,
     ClustersStage,
     CompressionStage,
     ConstructionStage,
@@ -178,6 +179,17 @@ def test_a_picture_needs_no_later_stage(stages, name):
 def test_a_missing_record_is_named(name):
     with pytest.raises(ParameterError, match="has no record"):
         stage_picture(name, {}, size=SIZE)
+
+
+def test_bounded_mode_has_a_picture_of_its_own(stages):
+    scene, perspective = stages["scene"], stages["perspective"]
+    z = 0.3 * perspective.vertices[:, 2]
+    record = BoundedStage(face_weight=np.linspace(0.1, 1.0, len(scene.faces)), attached=np.array([3]), z=z)
+    run = {"scene": scene, "perspective": perspective, "visibility": stages["visibility"], "bounded": record}
+    assert stage_picture("bounded", run, size=SIZE).shape == (80, 168, 3)
+    assert stage_picture("trim", {**run, "trim": stages["trim"]}, size=SIZE).shape == (80, 168, 3)
+    with pytest.raises(ParameterError, match="has no record"):
+        stage_picture("bounded", {}, size=SIZE)
 
 
 def test_an_unknown_stage_raises(stages):

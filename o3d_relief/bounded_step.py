@@ -1,0 +1,108 @@
+"""The step of the pipeline that stands in for all others in bounded mode."""
+
+from __future__ import annotations
+
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o3d_relief.bounds.bounded import closest_relief, lowest_seen
+from o3d_relief.bounds.pairs import Pairs, grid_pairs, vertex_pairs
+from o3d_relief.bounds.parts import tie_parts
+from o3d_relief.bounds.seen import face_weights, point_rows, seen_faces, seen_points
+from o3d_relief.errors import ParameterError
+from o3d_relief.linalg.laplacian import cotangent_laplacian
+from o3d_relief.params import ReliefParams
+from o3d_relief.records import BoundedStage, SceneStage
+from o3d_relief.steps import on_plane
+
+__all__ = ["bounded_step"]
+
+_EMPTY = 1e-3
+"""Stiffness of the springs across gaps in bounded mode: empty space gives depth away for nothing, the springs
+only settle what nothing else does."""
+
+
+def bounded_step(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    visible: NDArray[np.bool_],
+    scene: SceneStage,
+    params: ReliefParams,
+) -> BoundedStage:
+    """Find the closest relief of the wanted depth."""
+    z, n = vertices[:, 2], len(vertices)
+    face, share = seen_points(vertices, faces)
+    weight = face_weights(vertices, faces, seen_faces(faces, visible, face))
+    weight *= _kept_shape(scene, params)[faces].mean(axis=1)
+    attached = _attached(scene, params)
+    # Points of faces with visible corners only are in front where the corners are.
+    partly = ~visible[faces[face]].all(axis=1)
+    seen = point_rows(faces, face[partly], share[partly], n)
+    lowest = lowest_seen(z, seen, visible)
+    depth = cast(float, params.depth) / scene.unit
+    deep = float(z.max()) - lowest
+    if deep <= depth:
+        shallow = {"already_shallower": 1, "attached_missed": int((z[attached] > lowest).sum())}
+        return BoundedStage(face_weight=weight, attached=attached, z=on_plane(z - lowest), counts=shallow)
+
+    form, slivers = cotangent_laplacian(vertices, faces, weights=weight)
+    stacked = vertex_pairs(vertices, faces)
+    ties = tie_parts(
+        vertices, faces, form, np.arange(n), stacked, stacked.gap * (depth / deep), across_gaps=_EMPTY
+    )
+    found = closest_relief(
+        vertices,
+        faces,
+        form if ties is None else form + ties.among_held,
+        depth,
+        Pairs.join([stacked, grid_pairs(vertices, faces)]),
+        seen,
+        visible,
+        pull=np.zeros(n) if ties is None else ties.among_held_pull,
+        min_gap=params.min_gap / scene.unit,
+        attach=attached,
+    )
+    counts = {
+        "already_shallower": 0,
+        "slivers_mended": slivers,
+        "rounds": found.rounds,
+        "constraints": found.watched,
+        "pairs_corrected": found.corrected_pairs,
+        "attached": len(attached),
+        "attached_missed": found.attached_missed,
+        "left": found.left,
+        "visible_behind": int((found.z[visible] < 0.0).sum()),
+    }
+    return BoundedStage(
+        face_weight=weight, attached=attached, energy_gap=found.gap, z=on_plane(found.z), counts=counts
+    )
+
+
+def _attached(scene: SceneStage, params: ReliefParams) -> NDArray[np.int64]:
+    """Return the welded vertices that are to lie on S."""
+    count = len(scene.welded_index)
+    chosen = np.array(params.attach, dtype=np.int64)
+    if len(chosen) and chosen.max() >= count:
+        raise ParameterError(
+            f"attach must be numbers of the mesh's {count} vertices. Got {chosen.max()} instead."
+        )
+    welded = np.unique(scene.welded_index[chosen])
+    return np.asarray(welded[welded >= 0])
+
+
+def _kept_shape(scene: SceneStage, params: ReliefParams) -> NDArray[np.float64]:
+    """Return the weight of each welded vertex, the largest of its input vertices."""
+    if params.weights is None:
+        return np.ones(len(scene.vertices))
+    given = np.array(params.weights, dtype=np.float64)
+    if len(given) != len(scene.welded_index):
+        raise ParameterError(
+            f"weights must be one number for each of the mesh's {len(scene.welded_index)} vertices. "
+            f"Got {len(given)} numbers instead."
+        )
+    used = scene.welded_index >= 0
+    result = np.zeros(len(scene.vertices))
+    np.maximum.at(result, scene.welded_index[used], given[used])
+    return result

@@ -1,0 +1,237 @@
+"""The closest relief of a given depth: bounds on the heights instead of points and compression."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from o3d_relief.bounds.missed import BetweenLines
+from o3d_relief.bounds.order import out_of_order
+from o3d_relief.bounds.pairs import Pairs
+from o3d_relief.linalg.interior import minimise
+
+__all__ = ["Bounded", "closest_relief"]
+
+_KEPT_GAP = 0.1
+"""Every gap stays at least this share of what linear scaling would make of it."""
+
+_MARGIN = 0.1
+"""Share of the depth that the linear scaling which the solver starts from leaves free below and above."""
+
+_HOLD = 1e3
+"""Stiffness of the springs that hold the attached vertices on S, against cotangent weights of about 1."""
+
+_HELD = 1e-2
+"""Attached vertices that end within this share of the depth of S are set onto it."""
+
+_TOUCH = 2e-3
+"""Surfaces that are closer than this, in relief units, touch."""
+
+_LOOSE = 1e-9
+"""Weight that keeps the system definite where nothing else holds a vertex."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Bounded:
+    """The closest relief of a given depth.
+
+    Attributes
+    ----------
+    z : (n,) float64
+        New heights.
+    rounds : int
+        Linear systems solved.
+    watched : int
+        Rows of constraints that took part.
+    gap : float
+        Bound on how far the energy is above its minimum, as a share of it.
+    corrected_pairs : int
+        Pairs between the tested lines that had to be kept apart, too.
+    left : int
+        Pairs that are closer than asked for.
+    attached_missed : int
+        Attached vertices that could not be brought to S.
+    """
+
+    z: NDArray[np.float64]
+    rounds: int
+    watched: int
+    gap: float
+    corrected_pairs: int
+    left: int
+    attached_missed: int
+
+
+def closest_relief(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    form: sp.csr_array,
+    depth: float,
+    pairs: Pairs,
+    seen: sp.csr_array,
+    visible: NDArray[np.bool_],
+    *,
+    pull: NDArray[np.float64],
+    min_gap: float,
+    attach: NDArray[np.int64],
+) -> Bounded:
+    """Find the heights within a depth that change the differential coordinates least.
+
+    minimise    (z' - z)' K (z' - z) / 2 - pull' (z' - z)
+    subject to  0 <= z'           for every visible vertex and every seen point
+                z' <= depth       for every vertex
+                gap' > 0          for every pair of stacked surfaces.
+
+    Linear scaling fulfils every constraint with room to spare: the search starts there and never leaves
+    the inside. In the end the relief is moved and stretched a little so that it reaches from S to the
+    depth exactly, which keeps all constraints.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+        Original positions.
+    faces : (m, 3) int64
+    form : (n, n) sparse float64
+        K, a weighted Dirichlet energy and springs.
+    depth : float
+        In the unit of z, less than the depth of what is visible.
+    pairs : Pairs
+        What is stacked on vertical lines.
+    seen : (q, n) sparse float64
+        Rows that give the heights of seen points of the surface; their weights are positive and sum to 1.
+    visible : (n,) bool
+    pull : (n,) float64
+        Right-hand side that belongs to springs in `form`, zeros for none.
+    min_gap : float
+        Smallest gap of pairs that were not closer before.
+    attach : (a,) int64
+        Vertices to hold on S.
+
+    Returns
+    -------
+    Bounded
+    """
+    z, n = vertices[:, 2], len(vertices)
+    pairs = pairs.select(pairs.gap > _TOUCH / 2.0)
+    lowest = lowest_seen(z, seen, visible)
+    ratio = depth / (float(z.max()) - lowest)
+    inside = _MARGIN * depth + (1.0 - 2.0 * _MARGIN) * ratio * (z - lowest) - z
+
+    held = np.zeros(n)
+    held[attach] = _HOLD
+    hessian = (form + sp.diags_array(held + _LOOSE)).tocsr()
+    lower = np.where(visible & (held == 0.0), -z, -np.inf)
+    # Linear scaling must keep a little of its room: that is as far as a smallest gap can be asked for here.
+    kept = np.clip(np.minimum(pairs.gap, min_gap), _KEPT_GAP * ratio * pairs.gap, 0.7 * ratio * pairs.gap)
+    place = _Place(gap_rows(pairs, n), seen, visible, attach, depth)
+    between = BetweenLines(vertices, faces)
+    added = [0]
+
+    def missed(
+        x: NDArray[np.float64], accepted: NDArray[np.float64]
+    ) -> tuple[sp.csr_array, NDArray[np.float64]]:
+        wrong = between.missed_pairs(place(z + x))
+        there = np.subtract(*wrong.heights(z + accepted))
+        least = np.minimum(_KEPT_GAP * ratio * wrong.gap, there / 2.0)
+        # What touches has no order; it may turn about the point of contact a little.
+        least = np.where(wrong.gap > _TOUCH, least, -_TOUCH / 4.0)
+        usable = there > least + _TOUCH / 1000.0
+        added[0] += int(usable.sum())
+        return gap_rows(wrong.select(usable), n), (least - wrong.gap)[usable]
+
+    found = minimise(
+        hessian,
+        pull - held * z,
+        start=inside,
+        lower=lower,
+        upper=depth - z,
+        rows=sp.vstack([gap_rows(pairs, n), seen]).tocsr(),
+        bound=np.concatenate([kept - pairs.gap, -(seen @ z)]),
+        more_rows=missed,
+    )
+    result = place(z + found.x)
+    return Bounded(
+        z=result,
+        rounds=found.rounds,
+        watched=found.watched,
+        gap=found.gap,
+        corrected_pairs=added[0],
+        left=int(out_of_order(pairs, result, min_gap=(1.0 - 1e-6) * min_gap).sum()),
+        attached_missed=int((result[attach] != 0.0).sum()),
+    )
+
+
+class _Place:
+    """Move and stretch a relief so that it reaches from S to the depth, or set what is attached onto S."""
+
+    def __init__(
+        self,
+        gaps: sp.csr_array,
+        seen: sp.csr_array,
+        visible: NDArray[np.bool_],
+        attach: NDArray[np.int64],
+        depth: float,
+    ) -> None:
+        self._gaps, self._seen, self._visible = gaps, seen, visible
+        self._attach, self._depth = attach, depth
+
+    def __call__(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
+        if len(self._attach) == 0:
+            base = lowest_seen(z, self._seen, self._visible)
+            result = (z - base) * (self._depth / (float(z.max()) - base))
+        else:
+            result = _onto_plane(z * (self._depth / float(z.max())), self._attach, self._gaps, self._depth)
+        # Rounding must not leave anything visible behind S or beyond the depth.
+        return np.asarray(np.minimum(np.where(self._visible, np.maximum(result, 0.0), result), self._depth))
+
+
+def lowest_seen(z: NDArray[np.float64], seen: sp.csr_array, visible: NDArray[np.bool_]) -> float:
+    """Return the height of the lowest point that is seen.
+
+    Parameters
+    ----------
+    z : (n,) float64
+    seen : (q, n) sparse float64
+    visible : (n,) bool
+
+    Returns
+    -------
+    float
+    """
+    return min(float(z[visible].min(initial=np.inf)), float((seen @ z).min(initial=np.inf)))
+
+
+def gap_rows(pairs: Pairs, n: int) -> sp.csr_array:
+    """Return the matrix R, (p, n), with which R z is the height of the upper less that of the lower.
+
+    Like `Pairs.difference`, but without sorting the entries: there may be a million pairs.
+    """
+    columns = np.concatenate([pairs.upper, pairs.lower], axis=1)
+    values = np.concatenate([pairs.upper_weights, -pairs.lower_weights], axis=1)
+    return _rows(columns, values, n)
+
+
+def _rows(columns: NDArray[np.int64], values: NDArray[np.float64], n: int) -> sp.csr_array:
+    count, width = columns.shape
+    starts = np.arange(count + 1, dtype=np.int64) * width
+    kind = np.int32 if max(count * width, n) < 2**31 else np.int64
+    parts = values.ravel(), columns.ravel().astype(kind), starts.astype(kind)
+    return sp.csr_array(parts, shape=(count, n))
+
+
+def _onto_plane(
+    z: NDArray[np.float64], attach: NDArray[np.int64], gaps: sp.csr_array, depth: float
+) -> NDArray[np.float64]:
+    """Set attached vertices that are near S onto it, but for those that would change places with others."""
+    near = attach[np.abs(z[attach]) <= _HELD * depth]
+    result = z.copy()
+    result[near] = 0.0
+    while True:
+        wrong = np.flatnonzero((gaps @ result <= 0.0) & (gaps @ z > 0.0))
+        back = np.intersect1d(gaps[wrong].indices, near[result[near] != z[near]])
+        if len(back) == 0:
+            return np.asarray(result)
+        result[back] = z[back]
