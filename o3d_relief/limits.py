@@ -21,6 +21,8 @@ _READING = {
     ".gltf": 8,
     ".pcd": 10,
     ".xyz": 15,
+    ".xyzn": 15,
+    ".xyzrgb": 15,
     ".pts": 15,
     ".las": 15,
     ".laz": 40,

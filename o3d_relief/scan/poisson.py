@@ -104,7 +104,7 @@ def poisson_surface(
 
 @contextmanager
 def _unheard() -> Iterator[None]:
-    """Keep what the library below Open3D writes past Python, lines of its own source, off the error stream."""
+    """Keep what the library below Open3D writes past Python, its own lines, off the error stream."""
     if sys.stderr is not None:
         sys.stderr.flush()
     try:

@@ -89,8 +89,12 @@ class TestItsOwnWarnings:
         assert capfd.readouterr().err == "after\n"
 
     def test_without_a_stream_it_works_the_same(self):
-        code = "import os, numpy as np; os.close(2)\nfrom o3d_relief.scan.poisson import poisson_surface as f\n"
-        code += "p = np.random.default_rng(0).normal(size=(500, 3)); p /= np.linalg.norm(p, axis=1)[:, None]\n"
+        code = (
+            "import os, numpy as np; os.close(2)\nfrom o3d_relief.scan.poisson import poisson_surface as f\n"
+        )
+        code += (
+            "p = np.random.default_rng(0).normal(size=(500, 3)); p /= np.linalg.norm(p, axis=1)[:, None]\n"
+        )
         code += "print(len(f(p, p, depth=4, threads=1)[1]) > 0)"
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
         assert done.stdout == "True\n"
