@@ -1,4 +1,4 @@
-"""Feed damaged files and meshes to the package and count what becomes of them.
+"""Feed damaged files, meshes and point clouds to the package and count what becomes of them.
 
 python benchmarks/fuzz.py --count 20000 --seed 1
 """
@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
-from fuzz_cases import file_cases, mesh_cases
+from fuzz_cases import cloud_cases, file_cases, mesh_cases
 from fuzz_worker import Case, Pool
 
 _RUN = 100
@@ -51,7 +51,7 @@ def main() -> int:
 
     # Short runs of hypothesis: it tries variations of what it tried before, and should not for long.
     for first in range(0, options.count, _RUN):
-        campaign = given(st.one_of(file_cases(), file_cases(), mesh_cases()))(judge)
+        campaign = given(st.one_of(file_cases(), file_cases(), mesh_cases(), cloud_cases()))(judge)
         campaign = settings(
             max_examples=min(_RUN, options.count - first),
             database=None,

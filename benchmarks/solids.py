@@ -1,8 +1,9 @@
-"""Make a solid of every mesh of a folder: python benchmarks/solids.py [FOLDER] [--shapes ...] [--only ...].
+"""Make solids of all meshes and scans of a folder: python benchmarks/solids.py [FOLDER] [--shapes ...].
 
 FOLDER (default: the one that O3D_RELIEF_DATA names) may have a MANIFEST.tsv with the columns file, up and
 suggested_view_from. Each relief is made at the depth that is asked for, each solid measured by trimesh, which
-took no part in making it. A line for each, tab-separated; the exit code is 1 if one is not as asked for.
+took no part in making it. A line for each, tab-separated; the seconds are those of
+computing. The exit code is 1 if one is not as asked for.
 """
 
 from __future__ import annotations
@@ -15,11 +16,13 @@ import time
 from pathlib import Path
 
 import numpy as np
+import open3d as o3d
 import trimesh
 
 import o3d_relief as rel
 from o3d_relief.plate_params import SHAPES
-from o3d_relief.scene.read import READABLE
+from o3d_relief.scene.arrays import MeshArrays, to_open3d
+from o3d_relief.scene.read import READABLE, READABLE_CLOUDS, read_arrays
 from o3d_relief.solid.checks import check_solid
 from o3d_relief.solid.estimate import relief_depth
 
@@ -47,17 +50,26 @@ COLUMNS = [
 
 
 def views(folder: Path) -> dict[str, rel.View]:
-    """Return the view of each mesh file."""
+    """Return the view of each mesh or scan."""
     manifest = folder / "MANIFEST.tsv"
     if not manifest.exists():
-        return {path.name: rel.View() for path in sorted(folder.iterdir()) if path.suffix in READABLE}
+        endings = READABLE + READABLE_CLOUDS
+        return {path.name: rel.View() for path in sorted(folder.iterdir()) if path.suffix in endings}
     with manifest.open() as lines:
-        rows = [row for row in csv.DictReader(lines, delimiter="\t") if row["faces"] not in ("0", "-")]
+        rows = list(csv.DictReader(lines, delimiter="\t"))
     result = {}
     for row in rows:
         axis = row["suggested_view_from"].split()[0]
         result[row["file"]] = rel.View(front=axis.replace("+", "")[::-1], up=row["up"])
     return result
+
+
+def read(path: Path, view: rel.View) -> o3d.geometry.TriangleMesh:
+    """Read a mesh, or a scan as a mesh."""
+    arrays = read_arrays(path)
+    if isinstance(arrays, MeshArrays):
+        return to_open3d(arrays)
+    return rel.mesh_from_points(arrays.to_open3d(), view=view)
 
 
 def row_of(name: str, solid: rel.Solid, params: rel.PlateParams, seconds: tuple[float, float]) -> list[str]:
@@ -95,19 +107,19 @@ def main() -> None:
     for name, view in views(Path(options.folder)).items():
         if options.only and not any(word in name for word in options.only):
             continue
-        mesh = rel.read_mesh(Path(options.folder) / name)
+        mesh = read(Path(options.folder) / name, view)
         reliefs: dict[float | None, tuple[rel.Relief, float]] = {}
         for shape in options.shapes:
             params = rel.PlateParams(width_mm=150, depth_mm=25, shape=shape)
             depth = relief_depth(mesh, view, params)
-            started = time.perf_counter()
+            started = time.process_time()
             if depth not in reliefs:
                 relief = rel.make_relief(mesh, rel.ReliefParams(depth=depth), view=view)
-                reliefs[depth] = relief, time.perf_counter() - started
+                reliefs[depth] = relief, time.process_time() - started
             relief, relief_seconds = reliefs[depth]
-            started = time.perf_counter()
+            started = time.process_time()
             solid = rel.make_solid(relief, params)
-            row = row_of(name, solid, params, (relief_seconds, time.perf_counter() - started))
+            row = row_of(name, solid, params, (relief_seconds, time.process_time() - started))
             failed |= row[-1] == "FAIL"
             print("\t".join(row), flush=True)
     sys.exit(int(failed))

@@ -7,7 +7,14 @@ from pathlib import Path
 
 from o3d_relief.errors import FileError, MeshError, ParameterError
 
-__all__ = ["MAX_TRIANGLES", "available_memory", "check_file_size", "check_triangles", "memory_for"]
+__all__ = [
+    "MAX_TRIANGLES",
+    "available_memory",
+    "check_file_size",
+    "check_points",
+    "check_triangles",
+    "memory_for",
+]
 
 MAX_TRIANGLES = 10_000_000
 """Largest number of triangles that is accepted where no other is given; ten times a full scan."""
@@ -21,6 +28,8 @@ _READING = {
     ".gltf": 8,
     ".pcd": 10,
     ".xyz": 15,
+    ".xyzn": 15,
+    ".xyzrgb": 15,
     ".pts": 15,
     ".las": 15,
     ".laz": 40,
@@ -29,6 +38,9 @@ _READING = {
 
 _RELIEF = 1000
 """Bytes of memory for each triangle at the peak of making a relief; 720 were measured on 871,306."""
+
+_MESHING = 3000
+"""Bytes of memory for each point at the peak of meshing a cloud."""
 
 _CONTAINERS = (
     ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.stat", "anon"),
@@ -84,6 +96,27 @@ def check_file_size(path: Path, size: int) -> None:
         raise FileError(
             f"{path} is not read: it would need about {_words(needed)} of memory and {_words(free)} are "
             "free. Reduce the mesh in another program, or use a machine with more memory."
+        )
+
+
+def check_points(count: int) -> None:
+    """Refuse a point cloud whose meshing would need more memory than there is.
+
+    Parameters
+    ----------
+    count : int
+        The points that are used.
+
+    Raises
+    ------
+    MeshError
+        Too little memory.
+    """
+    needed, free = count * _MESHING, available_memory()
+    if needed > free:
+        raise MeshError(
+            f"A mesh of {count:,} points would need about {_words(needed)} of memory and {_words(free)} are "
+            "free: use fewer of them (max_points), or a machine with more memory."
         )
 
 

@@ -164,3 +164,5 @@ def _check_endings(options: argparse.Namespace, *, solid: bool) -> None:
     (check_solid_writable if solid else check_writable)(options.output)
     if options.height_map is not None:
         check_height_map(options.height_map)
+    if options.walls is not None and options.walls.suffix.lower() != ".png":
+        raise FileError(f"{options.walls} cannot be written: the picture of the walls must end in .png.")

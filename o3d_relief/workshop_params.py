@@ -106,7 +106,8 @@ class TileParams:
         for name in ("width_mm", "height_mm", "pin_mm", "pin_length_mm"):
             value = getattr(self, name)
             if value is not None:
-                object.__setattr__(self, name, _check_positive(name, value))
+                whose = "" if name.startswith("pin") else "The tile's "
+                object.__setattr__(self, name, _check_positive(f"{whose}{name}", value))
         object.__setattr__(self, "clearance_mm", check_range("clearance_mm", self.clearance_mm, 0.0, 2.0))
         if not isinstance(self.number, bool):
             raise ParameterError(f"number must be True or False. Got {self.number!r} instead.")

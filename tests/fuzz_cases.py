@@ -1,4 +1,4 @@
-"""The cases of the fuzz tests: damaged files and damaged meshes, with parameters of every size."""
+"""The cases of the fuzz tests: damaged files, meshes and point clouds, with parameters of every size."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 
 from hypothesis import strategies as st
 
+from fuzz_clouds import CLOUDS, cloud_defects, damaged_cloud, scans
 from fuzz_files import SAMPLES, Files, edited, edits
 from fuzz_meshes import SHAPES, damaged, defects
 from fuzz_worker import Case
@@ -57,13 +58,13 @@ outputs = _one_of([".ply", ".obj", ".stl", ".glb"])
 
 @lru_cache
 def _sample(name: str) -> Files:
-    return SAMPLES[name]()
+    return (SAMPLES | CLOUDS)[name]()
 
 
 @st.composite
 def file_cases(draw: st.DrawFn) -> Case:
     """Files with a few edits."""
-    name, changes = draw(_one_of(list(SAMPLES))), draw(edits)
+    name, changes = draw(_one_of([*SAMPLES, *CLOUDS])), draw(edits)
     files = _sample(name)
     for change in changes:
         files = edited(files, change)
@@ -83,4 +84,18 @@ def mesh_cases(draw: st.DrawFn) -> Case:
         view=view,
         output=output,
         picture=draw(st.sampled_from([True] + 9 * [False])),
+    )
+
+
+@st.composite
+def cloud_cases(draw: st.DrawFn) -> Case:
+    """Point clouds with a few defects."""
+    chosen, scan, view = draw(cloud_defects), draw(scans), draw(views)
+    return Case(
+        name=f"cloud {chosen} {scan} {view}",
+        arrays=damaged_cloud(*chosen),
+        params={"k": 4, "in_order": False},
+        view=view,
+        scan=scan,
+        output=draw(outputs),
     )

@@ -19,14 +19,14 @@ SHAPES: dict[str, Shape] = {
     "triangle": (np.array([[0.0, 0, 0], [1, 0, 0.2], [0, 1, 0.5]]), np.array([[0, 1, 2]])),
 }
 
-_SIZES = (1e-300, 1e-60, 1e-30, 1e-9, 1e-6, 1e-3, 1e3, 5e5, 5e6, 1e15, 1e38, 1e39, 1e154, 1e300)
-_VALUES = (np.nan, np.inf, -np.inf, 0.0, *_SIZES)
+SIZES = (1e-300, 1e-60, 1e-30, 1e-9, 1e-6, 1e-3, 1e3, 5e5, 5e6, 1e15, 1e38, 1e39, 1e154, 1e300)
+_VALUES = (np.nan, np.inf, -np.inf, 0.0, *SIZES)
 
 Array = np.ndarray
 Generator = np.random.Generator
 
 
-def _value(vertices: Array, number: float, rng: Generator) -> Array:
+def with_value(vertices: Array, number: float, rng: Generator) -> Array:
     vertices = vertices.copy()
     vertices.ravel()[rng.integers(vertices.size, size=1 + int(rng.integers(3)))] = number
     return vertices
@@ -123,11 +123,11 @@ def damaged(name: str, chosen: list[tuple[str, int]], damage: str | None, seed: 
     for defect, amount in chosen:
         rng = np.random.default_rng(amount)
         if defect in MOVES:
-            vertices = MOVES[defect](vertices, _SIZES[amount % len(_SIZES)], rng)
+            vertices = MOVES[defect](vertices, SIZES[amount % len(SIZES)], rng)
         elif defect in REBUILDS:
             vertices, faces = REBUILDS[defect](vertices, faces, rng)
         elif defect == "value":
-            vertices = _value(vertices, _VALUES[amount % len(_VALUES)], rng)
+            vertices = with_value(vertices, _VALUES[amount % len(_VALUES)], rng)
         else:
             extra |= _attributes(defect, len(vertices), len(faces), amount, rng)
     if damage is not None:

@@ -411,6 +411,7 @@ def test_dry_run_writes_nothing(tmp_path, scene, capsys):
         (["--depth-mm", "20", "--depth", "3"], "--depth-mm and --depth exclude each other"),
         (["--depth-mm", "20", "--alpha", "0.5"], "--depth-mm and --alpha exclude each other"),
         (["--walls", "missing/w.png"], "folder missing is missing"),
+        (["--walls", "w.jpg"], "w.jpg cannot be written: the picture of the walls must end in .png"),
     ],
 )
 def test_wrong_sizes_write_nothing(tmp_path, scene, capsys, words, sentence):

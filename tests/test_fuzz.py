@@ -1,4 +1,4 @@
-"""Damaged files and meshes, each run in a process that may die of it: a relief, or an error of ours.
+"""Damaged files, meshes and clouds, each in a process that may die of it: a relief, or an error of ours.
 
 `benchmarks/fuzz.py` runs more of them.
 """
@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 
-from fuzz_cases import file_cases, mesh_cases
+from fuzz_cases import cloud_cases, file_cases, mesh_cases
+from fuzz_clouds import CLOUDS
 from fuzz_files import SAMPLES
 from fuzz_meshes import SHAPES
 from fuzz_worker import Case, Pool
@@ -29,9 +30,9 @@ def _check(pool: Pool, case: Case) -> None:
     assert not outcome.startswith("BUG"), f"{case.name}\n{outcome}"
 
 
-@pytest.mark.parametrize("name", SAMPLES)
+@pytest.mark.parametrize("name", [*SAMPLES, *CLOUDS])
 def test_undamaged_files_give_a_relief(pool, name):
-    assert pool.run(Case(name=name, files=SAMPLES[name](), params={"k": 4})) == "relief"
+    assert pool.run(Case(name=name, files=(SAMPLES | CLOUDS)[name](), params={"k": 4})) == "relief"
 
 
 @pytest.mark.parametrize("name", SHAPES)
@@ -61,6 +62,16 @@ def test_damaged_meshes(pool):
     run()
 
 
+@pytest.mark.slow
+def test_damaged_clouds(pool):
+    @settings(REPEATABLE, max_examples=100)
+    @given(cloud_cases())
+    def run(case: Case) -> None:
+        _check(pool, case)
+
+    run()
+
+
 class TestPool:
     """What the worker reports of cases that do what no case should."""
 
@@ -81,9 +92,11 @@ class TestPool:
         assert outcome.startswith("BUG")
         assert sign in outcome
 
-    def test_a_case_that_takes_too_long_is_ended(self, pool, monkeypatch):
+    @pytest.mark.parametrize("code", ["__import__('time').sleep(60)", "[0 for _ in iter(int, 1)]"])
+    def test_a_case_that_takes_too_long_is_ended(self, pool, monkeypatch, code):
         monkeypatch.setattr("fuzz_worker.SECONDS", 0.5)
-        assert pool.run(_trap("__import__('time').sleep(60)")) == "BUG: it takes more than 0.5 s"
+        monkeypatch.setattr("fuzz_worker._WAIT", 2.0)
+        assert pool.run(_trap(code)) == "BUG: it takes more than 0.5 s"
 
 
 class _Trap(dict):

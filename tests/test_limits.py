@@ -2,11 +2,15 @@ import re
 import sys
 from pathlib import Path
 
+import numpy as np
+import open3d as o3d
 import pytest
 
 from o3d_relief import limits
 from o3d_relief.errors import FileError, MeshError, ParameterError
+from o3d_relief.scan_params import ScanParams
 from o3d_relief.scene.read import read_mesh
+from o3d_relief.scene.scan import mesh_from_points
 
 
 def test_free_memory_is_some_but_not_more_than_there_is():
@@ -64,6 +68,14 @@ def test_triangles():
         limits.check_triangles(10_000_001)
     with pytest.raises(MeshError, match=r"a relief of it would need about 931322\.6 GB of memory"):
         limits.check_triangles(10**12, 10**13)
+
+
+def test_points_that_are_thinned_need_less(monkeypatch):
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(np.random.default_rng(0).random((4000, 3))))
+    monkeypatch.setattr(limits, "available_memory", lambda: 3000 * 3999)
+    with pytest.raises(MeshError, match=r"A mesh of 4,000 points would need about 11 MB of memory and 11 MB"):
+        mesh_from_points(cloud)
+    mesh_from_points(cloud, ScanParams(max_points=3999))
 
 
 @pytest.mark.parametrize("most", [0, -1, 2.5, True, "many"])

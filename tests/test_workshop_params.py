@@ -29,7 +29,7 @@ def test_mill_sizes_that_cannot_be(values, sentence):
 @pytest.mark.parametrize(
     ("values", "sentence"),
     [
-        ({"width_mm": 0, "height_mm": 200}, r"width_mm must be greater than 0\. Got 0 instead\."),
+        ({"width_mm": 0, "height_mm": 200}, r"The tile's width_mm must be greater than 0\. Got 0"),
         ({"width_mm": 200, "height_mm": -5}, r"height_mm must be greater than 0\. Got -5 instead\."),
         ({"width_mm": float("inf"), "height_mm": 200}, "width_mm must be finite"),
         ({"width_mm": 200, "height_mm": 200, "pin_mm": 0}, "pin_mm must be greater than 0"),

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import open3d as o3d
@@ -88,7 +92,7 @@ def poisson_surface(
         raise MeshError("The points lie on one line: they have no surface.")
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(inside))
     cloud.normals = o3d.utility.Vector3dVector(normals)
-    with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
+    with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error), _unheard():
         mesh, density = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(
             cloud, depth=depth, scale=_MARGIN, n_threads=threads
         )
@@ -96,3 +100,22 @@ def poisson_surface(
         raise MeshError("No surface could be laid through the points.")
     vertices = np.asarray(mesh.vertices) * size + centre
     return vertices, np.array(mesh.triangles, dtype=np.int64), np.array(density, dtype=np.float64)
+
+
+@contextmanager
+def _unheard() -> Iterator[None]:
+    """Keep what the library below Open3D writes past Python, its own lines, off the error stream."""
+    if sys.stderr is not None:
+        sys.stderr.flush()
+    try:
+        kept = os.dup(2)
+    except OSError:  # a process without an error stream
+        yield
+        return
+    try:
+        with Path(os.devnull).open("w") as sink:
+            os.dup2(sink.fileno(), 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from o3d_relief.errors import MeshError
+from o3d_relief.limits import check_points
 from o3d_relief.params import Triple, View
 from o3d_relief.scan.ground import find_ground
 from o3d_relief.scan.neighbours import Neighbours, find_neighbours, local_spacings, outliers, thin
@@ -107,6 +108,7 @@ def points_step(cloud: CloudArrays, params: ScanParams, view: View) -> tuple[Poi
         raise MeshError(f"The points spread over {half:.3g}, which is too far for a scan.")
     size = 2.0 * half
     work = (points - centre) / size
+    check_points(min(len(points), params.max_points))
     kept = _thinned(work, params.max_points)
     index, points, work = index[kept], points[kept], work[kept]
     neighbours = find_neighbours(work)
