@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from o3d_relief.errors import FileError, MeshError, ParameterError, ReliefError, SolverError
+    from o3d_relief.errors import Cancelled, FileError, MeshError, ParameterError, ReliefError, SolverError
     from o3d_relief.linalg.laplacian import cotangent_laplacian
     from o3d_relief.measure import ReliefQuality, Yardstick, measure_relief
     from o3d_relief.params import ReliefParams, View
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "Cancelled",
     "FileError",
     "MeshError",
     "MillParams",
@@ -76,6 +77,7 @@ __all__ = [
 ]
 
 _HOME = {
+    "Cancelled": "errors",
     "FileError": "errors",
     "MeshError": "errors",
     "ParameterError": "errors",
