@@ -12,6 +12,7 @@ import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
+from o3d_relief.attenuation_step import attenuation_step
 from o3d_relief.bounded_step import bounded_step
 from o3d_relief.bounds.certificate import Certificate, certify
 from o3d_relief.errors import MeshError, ParameterError
@@ -27,7 +28,6 @@ from o3d_relief.scene.scan import scan_points
 from o3d_relief.scene.weld import weld
 from o3d_relief.stages.trim import Trimmed
 from o3d_relief.steps import (
-    attenuation_step,
     clusters_step,
     compression_step,
     construction_step,
@@ -240,7 +240,7 @@ def make_relief(
     else:
         clusters = journal.keep(clusters_step(vertices, params))
         journal.begin("attenuation")
-        points = journal.keep(attenuation_step(vertices, visible, clusters, params))
+        points = journal.keep(attenuation_step(vertices, visible, scene, clusters, params))
         journal.begin("construction")
         pairs = stacked_pairs(vertices, faces, params)
         z = journal.keep(
