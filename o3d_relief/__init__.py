@@ -6,6 +6,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from o3d_relief.batch import Batch, make_reliefs
+    from o3d_relief.batch_manifest import BatchEntry
     from o3d_relief.errors import Cancelled, FileError, MeshError, ParameterError, ReliefError, SolverError
     from o3d_relief.linalg.laplacian import cotangent_laplacian
     from o3d_relief.measure import ReliefQuality, Yardstick, measure_relief
@@ -36,6 +38,8 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "Batch",
+    "BatchEntry",
     "Cancelled",
     "FileError",
     "MeshError",
@@ -63,6 +67,7 @@ __all__ = [
     "height_field",
     "load_params",
     "make_relief",
+    "make_reliefs",
     "make_solid",
     "make_tiles",
     "measure_relief",
@@ -82,6 +87,9 @@ __all__ = [
 ]
 
 _HOME = {
+    "Batch": "batch",
+    "BatchEntry": "batch_manifest",
+    "make_reliefs": "batch",
     "Cancelled": "errors",
     "FileError": "errors",
     "MeshError": "errors",

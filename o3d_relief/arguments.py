@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from o3d_relief import __version__
+from o3d_relief.batch_arguments import add_batch
 from o3d_relief.errors import ParameterError
 from o3d_relief.limits import MAX_TRIANGLES
 from o3d_relief.params import ReliefParams, View
@@ -120,7 +121,7 @@ def _beta(text: str) -> float | tuple[float, ...]:
 
 
 def _parser(replaced: dict[str, Any]) -> argparse.ArgumentParser:
-    """Build the parser; `replaced` holds values in place of the defaults of the command "make"."""
+    """Build the parser; `replaced` holds values in place of the defaults of "make" and "batch"."""
     parser = _Parser(prog="o3d-relief", description="Make high reliefs from 3D scenes.", allow_abbrev=False)
     parser.add_argument("--version", action="version", version=f"o3d-relief {__version__}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND", dest="command")
@@ -154,6 +155,18 @@ def _parser(replaced: dict[str, Any]) -> argparse.ArgumentParser:
         "--max-triangles", type=int, metavar="N", help=f"refuse larger meshes (default: {MAX_TRIANGLES})"
     )
     make.set_defaults(**replaced)
+
+    many = commands.add_parser(
+        "batch",
+        help="make reliefs of many files at once",
+        description="Make a relief of each of many meshes and point clouds, on all cores or on a cluster. "
+        "After an interruption the same command goes on where it was.",
+    )
+    add_batch(many)
+    _add_view(many)
+    _add_params(many)
+    add_scan(many, _point)
+    many.set_defaults(**replaced)
 
     demo = commands.add_parser(
         "demo",
