@@ -117,7 +117,11 @@ def _dask(scheduler: str | None, jobs: int | None, stack: ExitStack) -> Engine:
             f"The Dask scheduler at {scheduler} does not answer ({error}): start it with dask scheduler, and "
             "workers with dask worker ADDRESS --nthreads 1."
         ) from error
-    patience = client.run_on_scheduler(_patience)
+
+    def allowed_failures(dask_scheduler: Any) -> int:  # in here, it goes to a scheduler without this package
+        return int(dask_scheduler.allowed_failures)
+
+    patience = client.run_on_scheduler(allowed_failures)
     if patience < MOST_ATTEMPTS:
         raise ReliefError(
             f"The Dask scheduler at {scheduler} gives a task up after {patience} lost workers, too early to "
@@ -132,10 +136,6 @@ def _dask(scheduler: str | None, jobs: int | None, stack: ExitStack) -> Engine:
             )
 
     return Engine(parallel=parallel, lost=(KilledWorker,))
-
-
-def _patience(dask_scheduler: Any) -> int:
-    return int(dask_scheduler.allowed_failures)
 
 
 def _ray(scheduler: str | None, jobs: int | None, stack: ExitStack) -> Engine:

@@ -171,7 +171,7 @@ def _make(task: BatchTask, notes: Notes, started: float, known: dict[str, Any]) 
     output = folder / task.output
     files = mesh_files(output, relief.mesh)
     depth = float(relief.mesh.get_max_bound()[2])
-    picture = render(relief.mesh, size=_PICTURE, plate=True, title=f"{output.stem}  {depth:.4g}")
+    picture = render(relief.mesh, size=_PICTURE, plate=True, title=f"{output.stem}, {depth:.4g} deep")
     save_png(folder / PICTURES / f"{output.stem}.png", picture)
     entry = task.entry(
         status="made",
