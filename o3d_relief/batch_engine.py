@@ -1,7 +1,8 @@
-"""Where the tasks of a batch run: workers of this machine, or a Dask or Ray cluster, all through joblib."""
+"""Where the tasks of a batch run: workers of this machine or of a Dask cluster, through joblib, or of Ray."""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -16,39 +17,24 @@ __all__ = ["ENGINES", "Engine", "open_engine"]
 ENGINES = ("loky", "dask", "ray")
 
 
+Entries = Generator[BatchEntry, None, None]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Engine:
     """Workers that are ready.
 
     Attributes
     ----------
-    parallel : callable
-        Returns a new joblib.Parallel.
+    run : callable
+        Takes a sequence of BatchTask and yields what became of each, in the order in which they are done.
+        Closing it ends what is under way.
     lost : tuple of exception types
-        What is raised where a worker was lost and its task with it.
+        What it raises where a worker was lost and its task with it.
     """
 
-    parallel: Callable[[], Any]
+    run: Callable[[Sequence[BatchTask]], Entries]
     lost: tuple[type[BaseException], ...]
-
-    def run(self, tasks: Sequence[BatchTask]) -> Generator[BatchEntry, None, None]:
-        """Run tasks and yield what became of each, in the order in which they are done.
-
-        Parameters
-        ----------
-        tasks : sequence of BatchTask
-
-        Yields
-        ------
-        BatchEntry
-        """
-        from joblib import delayed
-
-        results = self.parallel()(delayed(run_task)(task) for task in tasks)
-        try:
-            yield from results
-        finally:
-            results.close()  # ends what is still under way
 
 
 @contextmanager
@@ -94,7 +80,7 @@ def _loky(_scheduler: str | None, jobs: int | None, _stack: ExitStack) -> Engine
             pre_dispatch=jobs,
         )
 
-    return Engine(parallel=parallel, lost=(BrokenProcessPool,))
+    return Engine(run=_through_joblib(parallel), lost=(BrokenProcessPool,))
 
 
 def _dask(scheduler: str | None, jobs: int | None, stack: ExitStack) -> Engine:
@@ -135,34 +121,54 @@ def _dask(scheduler: str | None, jobs: int | None, stack: ExitStack) -> Engine:
                 n_jobs=-1, return_as="generator_unordered", batch_size=1, pre_dispatch=jobs or "all"
             )
 
-    return Engine(parallel=parallel, lost=(KilledWorker,))
+    return Engine(run=_through_joblib(parallel), lost=(KilledWorker,))
+
+
+def _through_joblib(parallel: Callable[[], Any]) -> Callable[[Sequence[BatchTask]], Entries]:
+    """Return what runs tasks in a new joblib.Parallel each time."""
+    from joblib import delayed
+
+    def run(tasks: Sequence[BatchTask]) -> Entries:
+        results = parallel()(delayed(run_task)(task) for task in tasks)
+        try:
+            for entry in results:  # `yield from` would close it, too, and let its warning out
+                yield entry
+        finally:
+            with warnings.catch_warnings():
+                # What is under way when the caller has had enough is meant to end.
+                warnings.filterwarnings("ignore", category=UserWarning, module="joblib")
+                results.close()
+
+    return run
 
 
 def _ray(scheduler: str | None, jobs: int | None, stack: ExitStack) -> Engine:
+    # Not through joblib: its Ray backend returns nothing before all is done.
     try:
         import ray
-        from ray.util.joblib import register_ray
     except ImportError as error:
         raise ReliefError("The engine ray is not installed: pip install 'o3d-relief[ray]'.") from error
-    from joblib import Parallel, parallel_config
 
+    where = {"num_cpus": jobs, "include_dashboard": False} if scheduler is None else {"address": scheduler}
     try:
-        if scheduler is None:
-            ray.init(num_cpus=jobs, include_dashboard=False, log_to_driver=False, logging_level="warning")
-        else:
-            ray.init(address=scheduler, log_to_driver=False, logging_level="warning")
+        ray.init(**where, log_to_driver=False, logging_level="error")
     except (ConnectionError, ValueError, RuntimeError) as error:
-        raise ReliefError(f"The Ray cluster {scheduler or ''} cannot be used: {error}") from error
+        raise ReliefError(f"The Ray cluster at {scheduler} does not answer: {error}") from error
     stack.callback(ray.shutdown)
-    register_ray()
+    # Ray begins a task again whose worker was lost; the task itself knows when to give up.
+    remote = ray.remote(num_cpus=1, max_retries=MOST_ATTEMPTS)(run_task)
 
-    def parallel() -> Any:
-        with parallel_config(backend="ray"):
-            return Parallel(
-                n_jobs=jobs or -1,
-                return_as="generator_unordered",
-                batch_size=1,
-                pre_dispatch=jobs or "all",
-            )
+    def run(tasks: Sequence[BatchTask]) -> Entries:
+        waiting = list(tasks)
+        running: list[Any] = []
+        try:
+            while waiting or running:
+                while waiting and (jobs is None or len(running) < jobs):
+                    running.append(remote.remote(waiting.pop(0)))
+                done, running = ray.wait(running)
+                yield from ray.get(done)
+        finally:
+            for task in running:
+                ray.cancel(task, force=True)
 
-    return Engine(parallel=parallel, lost=(ray.exceptions.RayError,))
+    return Engine(run=run, lost=(ray.exceptions.RayError,))

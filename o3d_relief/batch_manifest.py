@@ -126,18 +126,24 @@ class Notes:
 
     def begin(self, source: str) -> int:
         """Note that an input is begun; return how often it was by now."""
-        self._folder.mkdir(parents=True, exist_ok=True)
+        self._folder.mkdir(exist_ok=True)
         with self._path(source, "begun").open("ab") as file:
             file.write(b".")  # a byte each time: there is no half-written number
         return self.attempts(source)
 
     def keep(self, entry: BatchEntry) -> None:
         """Note what became of an input."""
+        self._folder.mkdir(exist_ok=True)
         write_bytes(self._path(entry.input, "json"), entry.line().encode())
 
     def end(self, source: str) -> None:
         """Note that an input is no longer worked on."""
         self._path(source, "begun").unlink(missing_ok=True)
+
+    def entry(self, source: str) -> BatchEntry | None:
+        """Return the entry that was kept of an input, None for none."""
+        path = self._path(source, "json")
+        return BatchEntry.from_line(path.read_text(encoding="utf-8")) if path.exists() else None
 
     def kept(self) -> list[BatchEntry]:
         """Return all entries that were kept."""

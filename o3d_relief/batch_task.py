@@ -100,6 +100,9 @@ def run_task(task: BatchTask) -> BatchEntry:
     """
     notes = Notes(Path(task.folder))
     with _ALONE:
+        kept = notes.entry(task.input)
+        if kept is not None and kept.holds(Path(task.folder), task.digest):
+            return kept  # by a worker that was lost before it could tell
         if notes.attempts(task.input) >= MOST_ATTEMPTS:
             return lost_entry(task, notes)
         attempts = notes.begin(task.input)

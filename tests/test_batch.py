@@ -79,9 +79,10 @@ def hidden(out):
     return [path.name for path in out.rglob(".*")]
 
 
+@pytest.mark.slow
 @POSIX
 def test_killed_and_taken_up_again(tmp_path):
-    """40 inputs on two workers: ended by SIGTERM, all killed at once, finished; then nothing is left to do."""
+    """40 inputs on two workers: ended by SIGTERM, all killed at once, finished; nothing is done twice."""
     inputs, out = write_balls(tmp_path / "in", 40), tmp_path / "out"
     process = start(inputs, out, "--jobs", "2")
     wait_for(process, out, 5)
@@ -125,6 +126,7 @@ def test_killed_and_taken_up_again(tmp_path):
     assert stamps(out) == everything
 
 
+@pytest.mark.slow
 def test_lost_workers_and_bad_files(tmp_path):
     """A worker that ends on one input is tried again, and then reported; the others are made."""
     inputs, out = write_balls(tmp_path / "in", 6), tmp_path / "out"
@@ -174,6 +176,7 @@ def test_lost_workers_and_bad_files(tmp_path):
     assert before.items() <= stamps(out).items()
 
 
+@pytest.mark.slow
 @POSIX
 def test_a_cluster_that_loses_a_machine(tmp_path):
     """A Dask scheduler and two workers, all processes of their own; one worker is killed in mid-run."""
@@ -219,9 +222,57 @@ def test_a_cluster_that_loses_a_machine(tmp_path):
     assert sum(line["attempts"] for line in lines(out)) in (12, 13)  # the input that the lost worker had
 
 
+@pytest.mark.slow
 def test_ray(tmp_path):
     pytest.importorskip("ray")
     inputs, out = write_balls(tmp_path / "in", 4), tmp_path / "out"
     code, told = finish(start(inputs, out, "--engine", "ray", "--jobs", "2"))
     assert code == 0, told
     assert [line["status"] for line in lines(out)] == ["made"] * 4
+
+
+def test_what_changed_is_made_again(tmp_path):
+    """In this process, but for the workers: what the library returns and tells."""
+    inputs, out = write_balls(tmp_path / "in", 3), tmp_path / "out"
+    params = rel.ReliefParams(k=4, in_order=False)
+    told, shares = [], []
+
+    def run(params=params, **options):
+        told.clear()
+        shares.clear()
+        return rel.make_reliefs(
+            inputs, out, params, jobs=2, on_done=lambda entry: told.append(Path(entry.input).stem),
+            on_progress=lambda stage, share: shares.append((stage, share)), **options,
+        )  # fmt: skip
+
+    batch = run()
+    assert batch.already_done == 0
+    assert batch.failed == ()
+    assert sorted(told) == ["ball_00", "ball_01", "ball_02"]
+    assert shares[0] == ("batch", None)
+    assert [share for _, share in shares[1:]] == pytest.approx([0, 1 / 3, 2 / 3, 1])
+    assert batch.sheets == (out / "contact_sheet.png",)
+    assert all(entry.output_sha256 for entry in batch.entries)
+
+    assert run().already_done == 3
+    assert told == []
+    inputs[1].write_bytes(inputs[0].read_bytes())  # another scan
+    (out / "ball_02.ply").write_bytes(b"ply, half of it")  # damaged
+    assert run().already_done == 1
+    assert sorted(told) == ["ball_01", "ball_02"]
+    assert (out / "ball_01.ply").read_bytes() == (out / "ball_00.ply").read_bytes()
+    assert run(rel.ReliefParams(k=5, in_order=False)).already_done == 0
+    assert run(rel.ReliefParams(k=5, in_order=False), view=rel.View(front="x")).already_done == 0
+
+
+def test_called_off(tmp_path):
+    inputs, out = write_balls(tmp_path / "in", 6), tmp_path / "out"
+    params = rel.ReliefParams(k=4, in_order=False)
+    with pytest.raises(rel.Cancelled, match="in the stage batch"):
+        rel.make_reliefs(inputs, out, params, jobs=2, on_progress=lambda _, share: (share or 0) < 0.3)
+    kept = [line for line in lines(out) if line["status"] == "made"]
+    assert 2 <= len(kept) < 6
+    batch = rel.make_reliefs(inputs, out, params, jobs=2)
+    assert len(kept) <= batch.already_done < 6
+    assert [Path(entry.input).name for entry in batch.entries] == [path.name for path in inputs]
+    assert hidden(out) == []
