@@ -6,12 +6,16 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from o3d_relief.errors import FileError, MeshError, ParameterError, ReliefError, SolverError
+    from o3d_relief.batch import Batch, make_reliefs
+    from o3d_relief.batch_manifest import BatchEntry
+    from o3d_relief.errors import Cancelled, FileError, MeshError, ParameterError, ReliefError, SolverError
     from o3d_relief.linalg.laplacian import cotangent_laplacian
     from o3d_relief.measure import ReliefQuality, Yardstick, measure_relief
     from o3d_relief.params import ReliefParams, View
+    from o3d_relief.params_file import load_params, save_params
     from o3d_relief.pipeline import Relief, make_relief
     from o3d_relief.plate_params import PlateParams
+    from o3d_relief.point_edits import PointEdit
     from o3d_relief.scan_params import ScanParams
     from o3d_relief.scene.demo import demo_scene
     from o3d_relief.scene.read import read_mesh, read_points
@@ -34,11 +38,15 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "Batch",
+    "BatchEntry",
+    "Cancelled",
     "FileError",
     "MeshError",
     "MillParams",
     "ParameterError",
     "PlateParams",
+    "PointEdit",
     "Relief",
     "ReliefError",
     "ReliefParams",
@@ -57,7 +65,9 @@ __all__ = [
     "cotangent_laplacian",
     "demo_scene",
     "height_field",
+    "load_params",
     "make_relief",
+    "make_reliefs",
     "make_solid",
     "make_tiles",
     "measure_relief",
@@ -66,6 +76,7 @@ __all__ = [
     "read_mesh",
     "read_points",
     "render",
+    "save_params",
     "save_png",
     "scan_points",
     "solid_under",
@@ -76,6 +87,10 @@ __all__ = [
 ]
 
 _HOME = {
+    "Batch": "batch",
+    "BatchEntry": "batch_manifest",
+    "make_reliefs": "batch",
+    "Cancelled": "errors",
     "FileError": "errors",
     "MeshError": "errors",
     "ParameterError": "errors",
@@ -83,6 +98,9 @@ _HOME = {
     "SolverError": "errors",
     "ReliefParams": "params",
     "View": "params",
+    "PointEdit": "point_edits",
+    "load_params": "params_file",
+    "save_params": "params_file",
     "Relief": "pipeline",
     "PlateParams": "plate_params",
     "Solid": "solid.body",

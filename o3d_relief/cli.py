@@ -9,6 +9,7 @@ import time
 from collections.abc import Sequence
 
 from o3d_relief.arguments import parse
+from o3d_relief.batch_command import batch
 from o3d_relief.console import make_folder, tell, tell_result, tell_stage, write_report, write_stages
 from o3d_relief.errors import ReliefError
 from o3d_relief.make_command import make
@@ -28,7 +29,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        Exit code: 0, 2 for anything the user can mend, 3 for warnings with --strict, 130 when interrupted.
+        Exit code: 0, 2 for anything the user can mend, 3 for warnings with --strict and for a batch of which
+        some inputs failed, 130 when interrupted.
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
     signals: list[int] = []
@@ -41,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         options = parse(given)
-        return {"make": make, "demo": _demo}[options.command](options)
+        return {"make": make, "batch": batch, "demo": _demo}[options.command](options)
     except ReliefError as error:
         tell(f"o3d-relief: error: {error}")
         return 2
@@ -66,6 +68,7 @@ def _demo(options: argparse.Namespace) -> int:
     import numpy as np
 
     from o3d_relief.pipeline import make_relief
+    from o3d_relief.progress_bar import StageBar
     from o3d_relief.scene.demo import demo_scene
     from o3d_relief.scene.write import write_mesh
     from o3d_relief.show.render import save_png
@@ -74,7 +77,11 @@ def _demo(options: argparse.Namespace) -> int:
     started = time.perf_counter()
     scene = demo_scene()
     tell(f"built-in scene: {len(scene.vertices)} vertices, {len(scene.triangles)} triangles")
-    relief = make_relief(scene, ReliefParams(alpha=0.8), on_stage=tell_stage)
+    bar = StageBar()
+    try:
+        relief = make_relief(scene, ReliefParams(alpha=0.8), on_stage=tell_stage, on_progress=bar)
+    finally:
+        bar.close()
     write_mesh(folder / "scene.ply", scene)
     write_mesh(folder / "relief.ply", relief.mesh)
     write_mesh(folder / "relief.glb", relief.mesh)

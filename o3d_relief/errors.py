@@ -1,6 +1,6 @@
 """The errors that this package raises: one clear sentence each."""
 
-__all__ = ["FileError", "MeshError", "ParameterError", "ReliefError", "SolverError"]
+__all__ = ["Cancelled", "FileError", "MeshError", "ParameterError", "ReliefError", "SolverError"]
 
 
 class ReliefError(Exception):
@@ -17,6 +17,10 @@ class MeshError(ReliefError, ValueError):
 
 class FileError(ReliefError, OSError):
     """A file that cannot be read or written."""
+
+
+class Cancelled(ReliefError):  # noqa: N818, it is no error of anybody
+    """The work was called off by the caller's `on_progress`."""
 
 
 class SolverError(ReliefError, RuntimeError):

@@ -9,7 +9,11 @@ from pathlib import Path
 
 from o3d_relief.errors import FileError
 
-__all__ = ["check_exists", "check_place", "write_bytes", "write_files"]
+__all__ = ["check_exists", "check_place", "clear_leftovers", "write_bytes", "write_files"]
+
+
+_WORK = ".o3d-relief-"
+"""Start of the names of the folders in which files are written before they are renamed; 8 letters follow."""
 
 
 def check_exists(path: str | Path) -> None:
@@ -69,6 +73,18 @@ def _check(path: Path) -> None:
         )
 
 
+def clear_leftovers(folder: str | Path) -> None:
+    """Take away what a process that was killed while it wrote has left in a folder.
+
+    Parameters
+    ----------
+    folder : str or Path
+        No other process may be writing to it.
+    """
+    for path in Path(folder).glob(_WORK + 8 * "?"):
+        shutil.rmtree(path, ignore_errors=True)
+
+
 def write_bytes(path: str | Path, content: bytes) -> None:
     """Write one file, all or nothing.
 
@@ -114,7 +130,7 @@ def write_files(path: str | Path, files: dict[str, bytes]) -> None:
 
 def _place(folder: Path, files: dict[str, bytes]) -> None:
     main = list(files)[-1]
-    work = Path(tempfile.mkdtemp(prefix=".o3d-relief-", dir=folder))
+    work = Path(tempfile.mkdtemp(prefix=_WORK, dir=folder))
     moved = []
     try:
         (work / "new").mkdir()

@@ -9,12 +9,14 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
+from o3d_relief.attenuation_step import beta_of_clusters
 from o3d_relief.bounds.order import keep_order
 from o3d_relief.bounds.pairs import Pairs, grid_pairs, vertex_pairs
 from o3d_relief.bounds.parts import tie_parts
 from o3d_relief.errors import MeshError, ParameterError
 from o3d_relief.linalg.laplacian import vertex_areas
 from o3d_relief.params import ReliefParams, Triple, View
+from o3d_relief.progress import Tick, silent
 from o3d_relief.records import (
     AttenuationStage,
     ClustersStage,
@@ -29,15 +31,7 @@ from o3d_relief.records import (
 from o3d_relief.scene.frame import RELIEF_UNITS, Frame, relief_frame, to_relief_units
 from o3d_relief.scene.weld import weld
 from o3d_relief.scene.winding import wrongly_wound
-from o3d_relief.stages.attenuation import (
-    actions,
-    attenuate,
-    differentials,
-    nearest_neighbours,
-    new_heights,
-    relative_differentials,
-    select_points,
-)
+from o3d_relief.stages.attenuation import attenuate
 from o3d_relief.stages.clustering import cluster_vertices
 from o3d_relief.stages.compression import alpha_for_depth, compress
 from o3d_relief.stages.construction import construct
@@ -139,52 +133,6 @@ def clusters_step(vertices: NDArray[np.float64], params: ReliefParams) -> Cluste
     )
 
 
-def _beta_of_points(params: ReliefParams, cluster: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Return the attenuation factor of each point; a sequence counts by points or by clusters."""
-    if isinstance(params.beta, float | int):
-        return np.full(len(cluster), float(params.beta))
-    beta = np.array(params.beta, dtype=np.float64)
-    if len(beta) == params.k:
-        return np.asarray(beta[cluster])
-    if len(beta) == len(cluster):
-        return beta
-    raise ParameterError(
-        f"beta must be one number or one for each of the {len(cluster)} attenuation points. "
-        f"Got {len(beta)} numbers instead."
-    )
-
-
-def attenuation_step(
-    vertices: NDArray[np.float64], visible: NDArray[np.bool_], clusters: ClustersStage, params: ReliefParams
-) -> AttenuationStage:
-    """Choose the attenuation points and find their new heights."""
-    index, cluster = select_points(vertices, visible, clusters.labels, clusters.centers)
-    height = vertices[index, 2]
-    differential = differentials(height, nearest_neighbours(vertices[index, :2], symmetric=False))
-    rho = relative_differentials(differential)
-    beta = _beta_of_points(params, cluster)
-    action = actions(rho, discard_above=params.discard_above, attach_below=params.attach_below)
-    settled = new_heights(vertices[index], rho, action, beta)
-    return AttenuationStage(
-        index=index,
-        cluster=cluster,
-        height=height,
-        differential=differential,
-        rho=rho,
-        beta=beta,
-        action=settled.action,
-        new_height=settled.new_height,
-        counts={
-            "points": len(index),
-            "clusters_without_visible_vertex": len(clusters.centers) - len(index),
-            "attach": int((settled.action == "attach").sum()),
-            "scale": int((settled.action == "scale").sum()),
-            "discard": int((settled.action == "discard").sum()),
-            "groups_attached": settled.groups_attached,
-        },
-    )
-
-
 def _behind(z: NDArray[np.float64], visible: NDArray[np.bool_]) -> int:
     return int((z[visible] < 0.0).sum())
 
@@ -205,11 +153,13 @@ def construction_step(
     clusters: ClustersStage,
     points: AttenuationStage,
     pairs: Pairs | None,
+    *,
+    tick: Tick = silent,
 ) -> ConstructionStage:
     """Rebuild the surface around the points, with its loose parts tied to the rest."""
     ties = None
     if pairs is not None:
-        beta = _beta_of_clusters(points, len(clusters.centers))[clusters.labels[pairs.upper[:, 0]]]
+        beta = beta_of_clusters(points, len(clusters.centers))[clusters.labels[pairs.upper[:, 0]]]
         shrink = attenuate(pairs.gap, beta)
         ties = tie_parts(vertices, faces, laplacian, points.kept_index, pairs, shrink)
     built = construct(
@@ -219,6 +169,7 @@ def construction_step(
         points.kept_height,
         among_held=None if ties is None else (ties.among_held, ties.among_held_pull),
         to_loose=None if ties is None else (ties.to_loose, ties.to_loose_pull),
+        tick=tick,
     )
     counts = {
         "fixed_points": len(points.kept_index),
@@ -236,13 +187,6 @@ def construction_step(
     return ConstructionStage(z=built.z, counts=counts)
 
 
-def _beta_of_clusters(points: AttenuationStage, clusters: int) -> NDArray[np.float64]:
-    """Return the attenuation factor of each cluster; one without a point takes the median."""
-    beta = np.full(clusters, float(np.median(points.beta)))
-    beta[points.cluster] = points.beta
-    return beta
-
-
 def restoration_step(
     vertices: NDArray[np.float64],
     visible: NDArray[np.bool_],
@@ -251,6 +195,8 @@ def restoration_step(
     clusters: ClustersStage,
     points: AttenuationStage,
     params: ReliefParams,
+    *,
+    tick: Tick = silent,
 ) -> RestorationStage:
     """Find order errors and pimples, and what is visible behind S, and mend them."""
     _, label = connected_components(laplacian, directed=False)
@@ -267,7 +213,7 @@ def restoration_step(
     if params.in_front:
         high |= lifting_discs(vertices, z, label, visible)
     floor = lowest_heights(vertices, visible, share=_KEPT_ON_PLANE) if params.in_front else None
-    restored = restore(vertices, laplacian, z, high, index, label, blend=params.blend, floor=floor)
+    restored = restore(vertices, laplacian, z, high, index, label, blend=params.blend, floor=floor, tick=tick)
     counts |= {
         "solved": int(restored.solved.sum()),
         "points_held": restored.points_held,
@@ -287,6 +233,8 @@ def order_step(
     pairs: Pairs | None,
     params: ReliefParams,
     unit: float,
+    *,
+    tick: Tick = silent,
 ) -> OrderStage:
     """Keep everything in order along the viewing direction."""
     if pairs is None:
@@ -303,6 +251,7 @@ def order_step(
         Pairs.join([pairs, grid_pairs(vertices, faces)]),
         in_front=visible if params.in_front else None,
         min_gap=min_gap,
+        tick=tick,
     )
     counts = {
         "pairs_corrected": ordered.corrected_pairs,

@@ -15,7 +15,7 @@ from o3d_relief.scene.encode import encode_mesh
 if TYPE_CHECKING:
     import open3d as o3d
 
-__all__ = ["WRITABLE", "check_writable", "lost_attributes", "write_mesh"]
+__all__ = ["WRITABLE", "check_writable", "lost_attributes", "mesh_files", "write_mesh"]
 
 WRITABLE = (".ply", ".obj", ".stl", ".glb")
 """The file endings that `write_mesh` writes."""
@@ -107,10 +107,31 @@ def write_mesh(path: str | Path, mesh: o3d.geometry.TriangleMesh) -> None:
     >>> write_mesh("box.ply", o3d.geometry.TriangleMesh.create_box())  # doctest: +SKIP
     """
     check_writable(path)
+    write_files(path, mesh_files(path, mesh))
+
+
+def mesh_files(path: str | Path, mesh: o3d.geometry.TriangleMesh) -> dict[str, bytes]:
+    """Return the files that `write_mesh` writes.
+
+    Parameters
+    ----------
+    path : str or Path
+    mesh : open3d.geometry.TriangleMesh
+
+    Returns
+    -------
+    dict of str to bytes
+        Contents by name; the main file last.
+
+    Raises
+    ------
+    MeshError
+        As for `write_mesh`.
+    """
     path = Path(path)
     arrays = from_open3d(mesh)
     _check_arrays(path, arrays)
-    write_files(path, encode_mesh(arrays, path.name))
+    return encode_mesh(arrays, path.name)
 
 
 def _check_arrays(path: Path, arrays: MeshArrays) -> None:

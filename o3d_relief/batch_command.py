@@ -1,0 +1,78 @@
+"""The command o3d-relief batch."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+from o3d_relief.arguments import chosen_params, chosen_view
+from o3d_relief.batch_manifest import MANIFEST
+from o3d_relief.console import tell
+from o3d_relief.scan_arguments import chosen_scan
+
+if TYPE_CHECKING:
+    from o3d_relief.batch_manifest import BatchEntry
+
+__all__ = ["batch"]
+
+
+def batch(options: argparse.Namespace) -> int:
+    """Run the command "batch".
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+
+    Returns
+    -------
+    int
+        Exit code: 0 where there is a relief of each input, 3 where some failed, 2 where all did.
+
+    Raises
+    ------
+    ReliefError
+        Anything that the user can mend.
+    """
+    params, view, scan = chosen_params(options), chosen_view(options), chosen_scan(options)
+
+    from o3d_relief.batch import make_reliefs
+    from o3d_relief.progress_bar import BatchBar
+
+    bar = BatchBar()
+    try:
+        made = make_reliefs(
+            options.inputs,
+            options.out,
+            params,
+            view=view,
+            scan=scan,
+            ending=f".{options.format}",
+            jobs=options.jobs,
+            engine=options.engine,
+            scheduler=options.scheduler,
+            max_triangles=options.max_triangles,
+            on_done=lambda entry: bar.write(tell, _line(entry)),
+            on_progress=bar,
+        )
+    finally:
+        bar.close()
+    failed = len(made.failed)
+    earlier = f", {made.already_done} of them from an earlier run" if made.already_done else ""
+    tell(f"{options.out}: {len(made.entries) - failed} reliefs{earlier}")
+    if failed:
+        tell(f"{failed} inputs failed: see {options.out / MANIFEST}")
+    for sheet in made.sheets:
+        tell(f"look at {sheet}")
+    if failed == len(made.entries):
+        return 2
+    return 3 if failed else 0
+
+
+def _line(entry: BatchEntry) -> str:
+    """Return what is said of an input, notes included."""
+    if not entry.made:
+        error = str(entry.error)
+        return f"failed: {error}" if entry.input in error else f"failed: {entry.input}: {error}"
+    told = f"{entry.triangles} triangles, {entry.depth:.4g} deep, {entry.seconds:.1f} s"
+    head = f"{entry.input} -> {entry.output}: {told}"
+    return "\n  ".join([head, *entry.notes])

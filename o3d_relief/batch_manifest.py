@@ -1,0 +1,223 @@
+"""What a batch has done: a line for each input, and what is noted while it is under way."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from hashlib import sha256
+from pathlib import Path
+
+from o3d_relief.errors import FileError
+from o3d_relief.files import write_bytes
+
+__all__ = ["MANIFEST", "PICTURES", "BatchEntry", "Manifest", "Notes"]
+
+MANIFEST = "manifest.jsonl"
+PICTURES = "pictures"
+_NOTES = ".o3d-relief-batch"
+
+
+@dataclass(frozen=True, kw_only=True)
+class BatchEntry:
+    """What became of one input.
+
+    Attributes
+    ----------
+    input : str
+        The file, with its whole path.
+    output : str
+        Name of the relief in the folder of the batch.
+    status : "made" or "failed"
+    seconds : float
+        What it took, reading and writing included.
+    depth : float or None
+        Of the relief, in the input's unit.
+    triangles : int or None
+        Of the relief.
+    error : str or None
+        A sentence that says why there is no relief.
+    notes : tuple of str
+        What was left out of the input, or does not fit into the output's format.
+    attempts : int
+        How often it was begun: more than once where a worker was lost.
+    input_bytes, input_mtime_ns : int
+        Size and time of the last change of the input, -1 where it is missing.
+    recipe : str
+        SHA-256 of parameters, view, format and version of the package.
+    output_sha256 : str or None
+        Of the relief's file.
+    """
+
+    input: str
+    output: str
+    status: str
+    seconds: float
+    depth: float | None = None
+    triangles: int | None = None
+    error: str | None = None
+    notes: tuple[str, ...] = ()
+    attempts: int = 1
+    input_bytes: int = -1
+    input_mtime_ns: int = -1
+    recipe: str = ""
+    output_sha256: str | None = None
+
+    @property
+    def made(self) -> bool:
+        """Whether there is a relief."""
+        return self.status == "made"
+
+    def line(self) -> str:
+        """Return the line of the manifest."""
+        return json.dumps(asdict(self)) + "\n"
+
+    @classmethod
+    def from_line(cls, line: str) -> BatchEntry:
+        """Read a line of a manifest; ValueError where it is none."""
+        values = json.loads(line)
+        try:
+            return cls(**(values | {"notes": tuple(values["notes"])}))
+        except (TypeError, KeyError) as error:
+            raise ValueError(f"not a line of a batch ({error})") from error
+
+    def holds(self, folder: Path, recipe: str) -> bool:
+        """Tell whether the relief is there, whole, and what input and recipe would give again.
+
+        Parameters
+        ----------
+        folder : Path
+            Of the batch.
+        recipe : str
+        """
+        if not self.made or self.recipe != recipe:
+            return False
+        try:
+            found = Path(self.input).stat()
+            if (found.st_size, found.st_mtime_ns) != (self.input_bytes, self.input_mtime_ns):
+                return False
+            picture = folder / PICTURES / f"{Path(self.output).stem}.png"
+            written = (folder / self.output).read_bytes()
+        except OSError:
+            return False  # something is missing
+        return picture.is_file() and sha256(written).hexdigest() == self.output_sha256
+
+
+class Notes:
+    """What workers note in the folder of a batch, each about its input alone.
+
+    A relief is noted with its checksum just before its file appears: whenever everything is killed, it is
+    known afterwards which reliefs are done.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the batch.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder / _NOTES
+
+    def attempts(self, source: str) -> int:
+        """Return how often an input was begun and not ended, which takes the worker's death."""
+        path = self._path(source, "begun")
+        return path.stat().st_size if path.exists() else 0
+
+    def begin(self, source: str) -> int:
+        """Note that an input is begun; return how often it was by now."""
+        self._folder.mkdir(exist_ok=True)
+        with self._path(source, "begun").open("ab") as file:
+            file.write(b".")  # a byte each time: there is no half-written number
+        return self.attempts(source)
+
+    def keep(self, entry: BatchEntry) -> None:
+        """Note what became of an input."""
+        self._folder.mkdir(exist_ok=True)
+        write_bytes(self._path(entry.input, "json"), entry.line().encode())
+
+    def end(self, source: str) -> None:
+        """Note that an input is no longer worked on."""
+        self._path(source, "begun").unlink(missing_ok=True)
+
+    def entry(self, source: str) -> BatchEntry | None:
+        """Return the entry that was kept of an input, None for none."""
+        path = self._path(source, "json")
+        return BatchEntry.from_line(path.read_text(encoding="utf-8")) if path.exists() else None
+
+    def kept(self) -> list[BatchEntry]:
+        """Return all entries that were kept."""
+        paths = sorted(self._folder.glob("*.json"))
+        return [BatchEntry.from_line(path.read_text(encoding="utf-8")) for path in paths]
+
+    def remove(self) -> None:
+        """Take all notes away."""
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    def _path(self, source: str, ending: str) -> Path:
+        return self._folder / f"{sha256(source.encode('utf-8', 'surrogateescape')).hexdigest()[:32]}.{ending}"
+
+
+class Manifest:
+    """The file manifest.jsonl of a batch's folder, together with the notes of a run that was killed.
+
+    While a batch is under way a line is added for each input that is done; in the end there is one line for
+    each input, in order.
+
+    Parameters
+    ----------
+    folder : Path
+        Must exist.
+
+    Raises
+    ------
+    FileError
+        The file is there and no manifest.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._path = folder / MANIFEST
+        self.notes = Notes(folder)
+        self.entries: dict[str, BatchEntry] = {}
+        for entry in (*self._lines(), *self.notes.kept()):
+            self.entries[entry.input] = entry
+        if self.entries:
+            self.tidy()
+        self.notes.remove()  # from here on, notes are those of this run
+
+    def _lines(self) -> list[BatchEntry]:
+        if not self._path.exists():
+            return []
+        try:
+            lines = self._path.read_text(encoding="utf-8").split("\n")
+        except (OSError, UnicodeDecodeError) as error:
+            raise FileError(f"{self._path} cannot be read: {error}. Move it away first.") from error
+        entries = []
+        # After the last line break is what was being written when everything was killed; it is in the notes.
+        for number, line in enumerate(lines[:-1], start=1):
+            try:
+                entries.append(BatchEntry.from_line(line))
+            except ValueError as error:
+                raise FileError(
+                    f"{self._path} is not the manifest of a batch, see line {number}: move it away, or "
+                    "choose another folder."
+                ) from error
+        return entries
+
+    def add(self, entry: BatchEntry) -> None:
+        """Add what became of an input."""
+        self.entries[entry.input] = entry
+        with self._path.open("a", encoding="utf-8", newline="\n") as file:
+            file.write(entry.line())
+
+    def tidy(self, order: Iterable[str] = ()) -> None:
+        """Write the manifest anew, one line for each input.
+
+        Parameters
+        ----------
+        order : iterable of str
+            Inputs that come first; others that the folder holds follow.
+        """
+        inputs = dict.fromkeys([*order, *self.entries])
+        self.entries = {source: self.entries[source] for source in inputs if source in self.entries}
+        write_bytes(self._path, "".join(entry.line() for entry in self.entries.values()).encode())

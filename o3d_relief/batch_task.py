@@ -1,0 +1,204 @@
+"""One input of a batch, from its file to the file of its relief, on whatever machine."""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from dataclasses import asdict, dataclass, replace
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from o3d_relief import __version__
+from o3d_relief.batch_manifest import PICTURES, BatchEntry, Notes
+from o3d_relief.errors import ReliefError
+from o3d_relief.params import ReliefParams, View
+from o3d_relief.scan_params import ScanParams
+
+if TYPE_CHECKING:
+    from open3d.geometry import PointCloud, TriangleMesh
+
+__all__ = ["MOST_ATTEMPTS", "BatchTask", "Recipe", "lost_entry", "run_task"]
+
+MOST_ATTEMPTS = 2
+"""An input that has cost so many workers their lives is given up."""
+
+_PICTURE = (320, 320)
+
+_ALONE = threading.Lock()
+"""Workers of several threads make one relief at a time: the threads of the linear algebra are set for a whole
+process, and nobody counts on the memory of two."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recipe:
+    """How the reliefs of a batch are made.
+
+    Attributes
+    ----------
+    params : ReliefParams
+    view : View
+    scan : ScanParams
+        For inputs that are point clouds.
+    ending : str
+        Of the reliefs' files: ".ply".
+    max_triangles : int or None
+    """
+
+    params: ReliefParams
+    view: View
+    scan: ScanParams
+    ending: str
+    max_triangles: int | None
+
+    def digest(self) -> str:
+        """Return the SHA-256 of all of it and of the package's version."""
+        text = json.dumps([__version__, asdict(self)], sort_keys=True)
+        return sha256(text.encode()).hexdigest()
+
+
+@dataclass(frozen=True, kw_only=True)
+class BatchTask:
+    """One input and where its relief goes.
+
+    Attributes
+    ----------
+    input : str
+        The file, with its whole path.
+    output : str
+        Name of the relief in the folder.
+    folder : str
+        Of the batch, with its whole path.
+    recipe : Recipe
+    digest : str
+        Of the recipe.
+    """
+
+    input: str
+    output: str
+    folder: str
+    recipe: Recipe
+    digest: str
+
+    def entry(self, **values: Any) -> BatchEntry:
+        """Return what the manifest says of the input."""
+        return BatchEntry(input=self.input, output=self.output, recipe=self.digest, **values)
+
+
+def run_task(task: BatchTask) -> BatchEntry:
+    """Make one relief.
+
+    Parameters
+    ----------
+    task : BatchTask
+
+    Returns
+    -------
+    BatchEntry
+        Whatever goes wrong is said in it; nothing is raised.
+    """
+    notes = Notes(Path(task.folder))
+    with _ALONE:
+        kept = notes.entry(task.input)
+        if kept is not None and kept.holds(Path(task.folder), task.digest):
+            return kept  # by a worker that was lost before it could tell
+        if notes.attempts(task.input) >= MOST_ATTEMPTS:
+            return lost_entry(task, notes)
+        attempts = notes.begin(task.input)
+        started = time.perf_counter()
+        try:
+            found = Path(task.input).stat()
+            stamp = {"input_bytes": found.st_size, "input_mtime_ns": found.st_mtime_ns}
+        except OSError:  # reading it will say why
+            stamp = {}
+        try:
+            entry = _make(task, notes, started, {"attempts": attempts, **stamp})
+        except Exception as error:  # noqa: BLE001, whatever is wrong with one input must not stop the others
+            entry = task.entry(
+                status="failed",
+                seconds=round(time.perf_counter() - started, 3),
+                error=_sentence(error),
+                attempts=attempts,
+                **stamp,
+            )
+            notes.keep(entry)
+        notes.end(task.input)
+        return entry
+
+
+def lost_entry(task: BatchTask, notes: Notes) -> BatchEntry:
+    """Return, and note, the entry of an input that has cost its workers their lives.
+
+    Parameters
+    ----------
+    task : BatchTask
+    notes : Notes
+
+    Returns
+    -------
+    BatchEntry
+    """
+    attempts = notes.attempts(task.input)
+    entry = task.entry(
+        status="failed",
+        seconds=0.0,
+        error=f"The worker was lost {attempts} times while it worked on this file: it crashed, or the system "
+        "ended it, mostly for want of memory. Try it alone with o3d-relief make.",
+        attempts=attempts,
+    )
+    notes.keep(entry)
+    notes.end(task.input)
+    return entry
+
+
+def _sentence(error: Exception) -> str:
+    if isinstance(error, ReliefError):
+        return str(error)
+    if isinstance(error, MemoryError):
+        return "The memory is used up: reduce the mesh, or use fewer workers or a machine with more memory."
+    return f"An unexpected {type(error).__name__}: {error}"
+
+
+def _make(task: BatchTask, notes: Notes, started: float, known: dict[str, Any]) -> BatchEntry:
+    from o3d_relief.files import write_files
+    from o3d_relief.pipeline import make_relief
+    from o3d_relief.scene.write import lost_attributes, mesh_files
+    from o3d_relief.show.render import render, save_png
+
+    recipe, folder = task.recipe, Path(task.folder)
+    scene, scan, left_out = _read(Path(task.input), recipe.scan)
+    relief = make_relief(
+        scene, recipe.params, view=recipe.view, scan=scan, max_triangles=recipe.max_triangles
+    )
+    output = folder / task.output
+    files = mesh_files(output, relief.mesh)
+    depth = float(relief.mesh.get_max_bound()[2])
+    picture = render(relief.mesh, size=_PICTURE, plate=True, title=f"{output.stem}, {depth:.4g} deep")
+    save_png(folder / PICTURES / f"{output.stem}.png", picture)
+    entry = task.entry(
+        status="made",
+        seconds=round(time.perf_counter() - started, 3),
+        depth=depth,
+        triangles=len(relief.mesh.triangles),
+        notes=(*left_out, *(lost_attributes(task.output, scene) if scan is None else ())),
+        output_sha256=sha256(files[output.name]).hexdigest(),
+        **known,
+    )
+    # The note comes first: killed in between, its checksum does not fit what is there, and all is done again.
+    notes.keep(entry)
+    write_files(output, files)
+    return entry
+
+
+def _read(path: Path, scan: ScanParams) -> tuple[TriangleMesh | PointCloud, ScanParams | None, list[str]]:
+    """Return the scene, how it is meshed where it is a point cloud, and what was left out."""
+    from o3d_relief.scene.arrays import MeshArrays, to_open3d
+    from o3d_relief.scene.read import left_out, read_arrays
+
+    arrays = read_arrays(path)
+    if isinstance(arrays, MeshArrays):
+        return to_open3d(arrays), None, left_out(path, arrays)
+    if arrays.sensor is not None and scan.sensor is None:
+        scan = replace(scan, sensor=arrays.sensor)
+    return arrays.to_open3d(), scan, []

@@ -1,0 +1,98 @@
+import dataclasses
+import os
+from hashlib import sha256
+
+import pytest
+
+from o3d_relief.batch_manifest import BatchEntry, Manifest, Notes
+from o3d_relief.errors import FileError
+
+
+@pytest.fixture
+def made(tmp_path):
+    """Return an entry whose input, relief and picture exist."""
+    scan = tmp_path / "scan.ply"
+    scan.write_bytes(b"points")
+    (tmp_path / "pictures").mkdir()
+    (tmp_path / "pictures" / "relief.png").touch()
+    (tmp_path / "relief.obj").write_bytes(b"faces")
+    return BatchEntry(
+        input=str(scan), output="relief.obj", status="made", seconds=1.5, depth=1 / 3, triangles=7,
+        notes=("no textures", "Größe"), attempts=2, input_bytes=6, input_mtime_ns=scan.stat().st_mtime_ns,
+        recipe="abc", output_sha256=sha256(b"faces").hexdigest(),
+    )  # fmt: skip
+
+
+def failed(name):
+    return BatchEntry(input=name, output="b.ply", status="failed", seconds=0.0, error="No.")
+
+
+def test_a_line_says_all(made):
+    line = made.line()
+    assert line.endswith("}\n")
+    assert line.count("\n") == 1
+    assert BatchEntry.from_line(line) == made
+
+
+@pytest.mark.parametrize("line", ["", "{}", "[1]", "3", '{"input": "a"}', '{"notes": [], "other": 3}', "{"])
+def test_other_lines_are_refused(line):
+    with pytest.raises(ValueError, match=r"line of a batch|Expecting"):
+        BatchEntry.from_line(line)
+
+
+def test_what_still_holds(tmp_path, made):
+    assert made.holds(tmp_path, "abc")
+    assert not made.holds(tmp_path, "abd")
+    assert not dataclasses.replace(made, status="failed").holds(tmp_path, "abc")
+    for name in ("scan.ply", "relief.obj"):
+        path = tmp_path / name
+        before = path.read_bytes(), path.stat()
+        path.write_bytes(b"xxxxx")
+        assert not made.holds(tmp_path, "abc")
+        path.unlink()
+        assert not made.holds(tmp_path, "abc")
+        path.write_bytes(before[0])
+        os.utime(path, ns=(before[1].st_atime_ns, before[1].st_mtime_ns))
+        assert made.holds(tmp_path, "abc")
+    (tmp_path / "pictures" / "relief.png").unlink()
+    assert not made.holds(tmp_path, "abc")
+
+
+def test_notes_count_what_was_begun(tmp_path):
+    notes = Notes(tmp_path)
+    assert notes.attempts("a") == 0
+    assert notes.entry("a") is None
+    assert [notes.begin("a"), notes.begin("a"), notes.begin("b")] == [1, 2, 1]
+    assert Notes(tmp_path).attempts("a") == 2
+    notes.keep(failed("a"))
+    notes.end("a")
+    assert notes.attempts("a") == 0
+    assert notes.entry("a") == failed("a")
+    assert notes.kept() == [failed("a")]
+    notes.remove()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_last_word_on_an_input_counts(tmp_path, made):
+    manifest = Manifest(tmp_path)
+    manifest.add(failed("x"))
+    manifest.add(failed(made.input))
+    manifest.add(made)
+    manifest.notes.keep(failed("y"))
+    # As after a kill: the last line was not finished, and the notes are still there.
+    with (tmp_path / "manifest.jsonl").open("a") as file:
+        file.write('{"input": "y", "outp')
+    again = Manifest(tmp_path)
+    assert again.entries == {"x": failed("x"), made.input: made, "y": failed("y")}
+    again.tidy([made.input, "y", "unknown"])
+    lines = (tmp_path / "manifest.jsonl").read_text().splitlines()
+    assert [BatchEntry.from_line(line) for line in lines] == [made, failed("y"), failed("x")]
+
+
+@pytest.mark.parametrize("content", [b"{}\n", b"my own list\n", b"\xff\xfe\n"])
+def test_a_file_that_is_no_manifest_is_left_alone(tmp_path, content):
+    path = tmp_path / "manifest.jsonl"
+    path.write_bytes(content)
+    with pytest.raises(FileError, match=r"manifest\.jsonl .*ove it away"):
+        Manifest(tmp_path)
+    assert path.read_bytes() == content
