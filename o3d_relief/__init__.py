@@ -6,6 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from o3d_relief.editor import ReliefEditor
     from o3d_relief.errors import FileError, MeshError, ParameterError, ReliefError, SolverError
     from o3d_relief.linalg.laplacian import cotangent_laplacian
     from o3d_relief.measure import ReliefQuality, Yardstick, measure_relief
@@ -43,6 +44,7 @@ __all__ = [
     "PlateParams",
     "PointEdit",
     "Relief",
+    "ReliefEditor",
     "ReliefError",
     "ReliefParams",
     "ReliefQuality",
@@ -88,6 +90,7 @@ _HOME = {
     "SolverError": "errors",
     "ReliefParams": "params",
     "View": "params",
+    "ReliefEditor": "editor",
     "PointEdit": "point_edits",
     "load_params": "params_file",
     "save_params": "params_file",
