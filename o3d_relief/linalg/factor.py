@@ -85,6 +85,11 @@ class Factor:
     positions : (n, 3) float64
         Of the vertices that the unknowns belong to.
 
+    Attributes
+    ----------
+    order : (n,) int64
+        The unknowns in the order in which they are eliminated.
+
     Raises
     ------
     SolverError
@@ -92,8 +97,9 @@ class Factor:
     """
 
     def __init__(self, matrix: sp.csr_array, positions: NDArray[np.float64]) -> None:
-        self._order = nested_dissection(positions, matrix)
-        ordered = matrix[self._order][:, self._order].tocsc()
+        self.order = nested_dissection(positions, matrix)
+        self.order.flags.writeable = False
+        ordered = matrix[self.order][:, self.order].tocsc()
         try:
             with threadpool_limits(limits=1):
                 self._factor = sla.splu(
@@ -103,8 +109,12 @@ class Factor:
             raise SolverError(f"A linear system of {len(positions)} unknowns is singular.") from error
 
     def solve(self, right_hand_side: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Solve for one right-hand side, (n,), or for several, (n, q)."""
-        solution = np.zeros(right_hand_side.shape)
-        with threadpool_limits(limits=1):
-            solution[self._order] = self._factor.solve(right_hand_side[self._order])
+        """Solve for one right-hand side, (n,)."""
+        solution = np.zeros(len(right_hand_side))
+        solution[self.order] = self.solve_ordered(right_hand_side[self.order])
         return solution
+
+    def solve_ordered(self, right_hand_sides: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Solve for (n,) or (n, q), whose rows, and those of the solution, are in `order`."""
+        with threadpool_limits(limits=1):
+            return np.asarray(self._factor.solve(right_hand_sides), dtype=np.float64)

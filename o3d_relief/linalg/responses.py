@@ -59,23 +59,25 @@ class Responses:
         *,
         keep_factor: bool = False,
     ) -> None:
+        self._count = len(positions)
         self._index = index
-        self._free = np.flatnonzero(free)
         self._point_rows = form[index]
-        self._weights = np.zeros((len(positions), len(index)), dtype=np.float32)
-        self._weights[index, np.arange(len(index))] = 1.0
-        self._schur = np.zeros((len(index), len(index)))
-        rows = form[self._free]
-        factor = Factor(rows[:, self._free].tocsr(), positions[self._free])
-        pulls = -rows[:, index].tocsc()
-        for start in range(0, len(index), _BLOCK):
-            block = np.arange(start, min(start + _BLOCK, len(index)))
-            moved = np.zeros((len(positions), len(block)))
-            moved[index[block], np.arange(len(block))] = 1.0
-            moved[self._free] = factor.solve(pulls[:, block].toarray())
-            self._schur[:, block] = self._point_rows @ moved
-            self._weights[self._free, start : start + len(block)] = moved[self._free]
+        free_vertices = np.flatnonzero(free)
+        rows = form[free_vertices]
+        factor = Factor(rows[:, free_vertices].tocsr(), positions[free_vertices])
+        # All that is dense keeps the order of the factor: sorting it would take as long as solving for it.
+        self._free = free_vertices[factor.order]
         self._factor = factor if keep_factor else None
+        self._weights = np.zeros((len(self._free), len(index)), dtype=np.float32, order="F")
+        self._schur = self._point_rows[:, index].toarray()
+        pulls = -rows[factor.order][:, index].tocsc()
+        near = np.unique(pulls.indices)
+        coupling = self._point_rows[:, self._free[near]]
+        for start in range(0, len(index), _BLOCK):
+            block = slice(start, start + _BLOCK)
+            solved = factor.solve_ordered(pulls[:, block].toarray(order="F"))
+            self._weights[:, block] = solved
+            self._schur[:, block] += coupling @ solved[near]
 
     def displacement(
         self,
@@ -99,15 +101,15 @@ class Responses:
         (n,) float64
         """
         points = np.where(released, 0.0, moved)
-        follow = np.zeros(len(self._weights))
+        result = np.zeros(self._count)
         pulled = np.zeros(len(points))
         if pull is not None and self._factor is not None:
-            follow[self._free] = self._factor.solve(pull[self._free])
-            pulled = pull[self._index] - self._point_rows @ follow
+            result[self._free] = self._factor.solve_ordered(pull[self._free])
+            pulled = pull[self._index] - self._point_rows @ result
         with threadpool_limits(limits=1):
             if released.any():
                 force = pulled - self._schur @ points
                 points[released] = np.linalg.solve(self._schur[np.ix_(released, released)], force[released])
-            result = follow + self._weights @ points.astype(np.float32)
+            result[self._free] += self._weights @ points.astype(np.float32)
         result[self._index] = points
-        return np.asarray(result)
+        return result
