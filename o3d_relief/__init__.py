@@ -9,6 +9,8 @@ if TYPE_CHECKING:
     from o3d_relief.batch import Batch, make_reliefs
     from o3d_relief.batch_manifest import BatchEntry
     from o3d_relief.errors import Cancelled, FileError, MeshError, ParameterError, ReliefError, SolverError
+    from o3d_relief.editor import ReliefEditor
+    from o3d_relief.errors import FileError, MeshError, ParameterError, ReliefError, SolverError
     from o3d_relief.linalg.laplacian import cotangent_laplacian
     from o3d_relief.measure import ReliefQuality, Yardstick, measure_relief
     from o3d_relief.params import ReliefParams, View
@@ -48,6 +50,7 @@ __all__ = [
     "PlateParams",
     "PointEdit",
     "Relief",
+    "ReliefEditor",
     "ReliefError",
     "ReliefParams",
     "ReliefQuality",
@@ -98,6 +101,7 @@ _HOME = {
     "SolverError": "errors",
     "ReliefParams": "params",
     "View": "params",
+    "ReliefEditor": "editor",
     "PointEdit": "point_edits",
     "load_params": "params_file",
     "save_params": "params_file",
