@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from o3d_relief.errors import FileError, MeshError, ParameterError, ReliefError, SolverError
+    from o3d_relief.errors import DisplayError, FileError, MeshError, ParameterError, ReliefError, SolverError
     from o3d_relief.linalg.laplacian import cotangent_laplacian
     from o3d_relief.measure import ReliefQuality, Yardstick, measure_relief
     from o3d_relief.params import ReliefParams, View
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from o3d_relief.show.comparison import comparison_sheet
     from o3d_relief.show.render import render, save_png
     from o3d_relief.show.sheets import contact_sheet
+    from o3d_relief.show.viewer import StageViewer, show_stages
     from o3d_relief.solid.body import Solid
     from o3d_relief.solid.checks import SolidReport, check_solid
     from o3d_relief.solid.formats import write_solid
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "DisplayError",
     "FileError",
     "MeshError",
     "MillParams",
@@ -48,6 +50,7 @@ __all__ = [
     "Solid",
     "SolidReport",
     "SolverError",
+    "StageViewer",
     "TileParams",
     "View",
     "Yardstick",
@@ -68,6 +71,7 @@ __all__ = [
     "render",
     "save_png",
     "scan_points",
+    "show_stages",
     "solid_under",
     "view_direction",
     "write_height_map",
@@ -76,6 +80,7 @@ __all__ = [
 ]
 
 _HOME = {
+    "DisplayError": "errors",
     "FileError": "errors",
     "MeshError": "errors",
     "ParameterError": "errors",
@@ -115,6 +120,8 @@ _HOME = {
     "render": "show.render",
     "save_png": "show.render",
     "view_direction": "show.camera",
+    "StageViewer": "show.viewer",
+    "show_stages": "show.viewer",
 }
 
 

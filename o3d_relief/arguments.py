@@ -15,6 +15,7 @@ from o3d_relief.limits import MAX_TRIANGLES
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.plate_params import HANGINGS, LOOSE, PRINT_DIRECTIONS, SHAPES, PlateParams
 from o3d_relief.scan_arguments import add_scan
+from o3d_relief.window_arguments import add_windows
 from o3d_relief.workshop_arguments import add_workshop, wants_workshop
 
 __all__ = ["chosen_params", "chosen_plate", "chosen_view", "parse"]
@@ -137,8 +138,9 @@ def _parser() -> argparse.ArgumentParser:
         "--dry-run", action="store_true", help="only tell sizes, volume, triangles and memory in advance"
     )
 
-    make.add_argument(
-        "--max-triangles", type=int, metavar="N", help=f"refuse larger meshes (default: {MAX_TRIANGLES})"
+    _add_limit(make)
+    add_windows(
+        commands, _FORMATS, [_add_view, _add_params, lambda command: add_scan(command, _point), _add_limit]
     )
 
     demo = commands.add_parser(
@@ -155,6 +157,12 @@ def _parser() -> argparse.ArgumentParser:
         help="default: %(default)s",
     )
     return parser
+
+
+def _add_limit(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--max-triangles", type=int, metavar="N", help=f"refuse larger meshes (default: {MAX_TRIANGLES})"
+    )
 
 
 def _add_view(command: argparse.ArgumentParser) -> None:

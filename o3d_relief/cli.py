@@ -13,6 +13,7 @@ from o3d_relief.console import make_folder, tell, tell_result, tell_stage, write
 from o3d_relief.errors import ReliefError
 from o3d_relief.make_command import make
 from o3d_relief.params import ReliefParams
+from o3d_relief.view_command import view
 
 __all__ = ["main"]
 
@@ -41,7 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         options = parse(given)
-        return {"make": make, "demo": _demo}[options.command](options)
+        return {"make": make, "demo": _demo, "view": view}[options.command](options)
     except ReliefError as error:
         tell(f"o3d-relief: error: {error}")
         return 2

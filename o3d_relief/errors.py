@@ -1,6 +1,6 @@
 """The errors that this package raises: one clear sentence each."""
 
-__all__ = ["FileError", "MeshError", "ParameterError", "ReliefError", "SolverError"]
+__all__ = ["DisplayError", "FileError", "MeshError", "ParameterError", "ReliefError", "SolverError"]
 
 
 class ReliefError(Exception):
@@ -21,3 +21,7 @@ class FileError(ReliefError, OSError):
 
 class SolverError(ReliefError, RuntimeError):
     """A linear system that could not be solved to the accuracy asked for."""
+
+
+class DisplayError(ReliefError, RuntimeError):
+    """A window that cannot be opened here."""

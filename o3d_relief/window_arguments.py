@@ -1,0 +1,33 @@
+"""The words of the command line for the windows."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+__all__ = ["add_windows"]
+
+AddOptions = Callable[[argparse.ArgumentParser], None]
+
+
+def add_windows(commands: Any, formats: str, options: Sequence[AddOptions]) -> None:
+    """Add the command "view".
+
+    Parameters
+    ----------
+    commands : subparsers of argparse
+    formats : str
+        The kinds of files that can be read.
+    options : sequence of callable
+        Each adds options of the command "make".
+    """
+    view = commands.add_parser(
+        "view",
+        help="make a relief and step through its stages in a window",
+        description="Make a relief and show each stage in a window as soon as it is computed.",
+    )
+    view.add_argument("input", type=Path, metavar="INPUT", help=f"{formats} file")
+    for add in options:
+        add(view)
