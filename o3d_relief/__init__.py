@@ -10,8 +10,10 @@ if TYPE_CHECKING:
     from o3d_relief.linalg.laplacian import cotangent_laplacian
     from o3d_relief.measure import ReliefQuality, Yardstick, measure_relief
     from o3d_relief.params import ReliefParams, View
+    from o3d_relief.params_file import load_params, save_params
     from o3d_relief.pipeline import Relief, make_relief
     from o3d_relief.plate_params import PlateParams
+    from o3d_relief.point_edits import PointEdit
     from o3d_relief.scan_params import ScanParams
     from o3d_relief.scene.demo import demo_scene
     from o3d_relief.scene.read import read_mesh, read_points
@@ -41,6 +43,7 @@ __all__ = [
     "MillParams",
     "ParameterError",
     "PlateParams",
+    "PointEdit",
     "Relief",
     "ReliefError",
     "ReliefParams",
@@ -60,6 +63,7 @@ __all__ = [
     "cotangent_laplacian",
     "demo_scene",
     "height_field",
+    "load_params",
     "make_relief",
     "make_solid",
     "make_tiles",
@@ -69,6 +73,7 @@ __all__ = [
     "read_mesh",
     "read_points",
     "render",
+    "save_params",
     "save_png",
     "scan_points",
     "show_stages",
@@ -88,6 +93,9 @@ _HOME = {
     "SolverError": "errors",
     "ReliefParams": "params",
     "View": "params",
+    "PointEdit": "point_edits",
+    "load_params": "params_file",
+    "save_params": "params_file",
     "Relief": "pipeline",
     "PlateParams": "plate_params",
     "Solid": "solid.body",

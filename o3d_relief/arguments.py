@@ -7,12 +7,13 @@ import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from o3d_relief import __version__
 from o3d_relief.errors import ParameterError
 from o3d_relief.limits import MAX_TRIANGLES
 from o3d_relief.params import ReliefParams, View
+from o3d_relief.params_file import field_values, load_params
 from o3d_relief.plate_params import HANGINGS, LOOSE, PRINT_DIRECTIONS, SHAPES, PlateParams
 from o3d_relief.scan_arguments import add_scan
 from o3d_relief.window_arguments import add_windows
@@ -37,9 +38,20 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     -------
     argparse.Namespace
         With the name of the command in `command`. Help, version and words that are not understood end the
-        program, the last with one sentence and exit code 2.
+        program, the last with one sentence and exit code 2. What a parameter file says takes the place
+        of the defaults.
+
+    Raises
+    ------
+    ReliefError
+        A parameter file that cannot be used.
     """
-    return _parser().parse_args(_join_points(list(arguments)))
+    words = _join_points(list(arguments))
+    options = _parser({}).parse_args(words)
+    if getattr(options, "params", None) is None:
+        return options
+    params, view = load_params(options.params)
+    return _parser(field_values(params) | field_values(view)).parse_args(words)
 
 
 class _Parser(argparse.ArgumentParser):
@@ -108,7 +120,8 @@ def _beta(text: str) -> float | tuple[float, ...]:
     return numbers[0] if len(numbers) == 1 else numbers
 
 
-def _parser() -> argparse.ArgumentParser:
+def _parser(replaced: dict[str, Any]) -> argparse.ArgumentParser:
+    """Build the parser; `replaced` holds values in place of the defaults of the command "make"."""
     parser = _Parser(prog="o3d-relief", description="Make high reliefs from 3D scenes.", allow_abbrev=False)
     parser.add_argument("--version", action="version", version=f"o3d-relief {__version__}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND", dest="command")
@@ -142,6 +155,7 @@ def _parser() -> argparse.ArgumentParser:
     add_windows(
         commands, _FORMATS, [_add_view, _add_params, lambda command: add_scan(command, _point), _add_limit]
     )
+    make.set_defaults(**replaced)
 
     demo = commands.add_parser(
         "demo",
@@ -189,6 +203,8 @@ def _add_params(command: argparse.ArgumentParser) -> None:
     default = ReliefParams()
     group = command.add_argument_group("relief")
     add = group.add_argument
+    add("--params", type=Path, metavar="FILE.json",
+        help="a parameter file, for the view, too; options beside it override what it says")  # fmt: skip
     add("--mode", choices=("attenuation", "bounded"),
         help="the paper's method, or the closest relief of a depth (default: with --depth)")  # fmt: skip
     add("-k", type=int, default=default.k, metavar="N", help="attenuation points (default: %(default)s)")
@@ -202,12 +218,13 @@ def _add_params(command: argparse.ArgumentParser) -> None:
     ):
         add(f"--{name.replace('_', '-')}", type=float, default=getattr(default, name), metavar="T",
             help=f"{text} (default: %(default)s)")  # fmt: skip
-    add("--no-smooth-points", dest="smooth_points", action="store_false",
-        help="the paper's own restoration, without smoothing around the points")  # fmt: skip
-    add("--no-in-front", dest="in_front", action="store_false",
-        help="the paper's own behaviour: visible parts may end behind the plane and are trimmed")  # fmt: skip
-    add("--no-in-order", dest="in_order", action="store_false",
-        help="the paper's own behaviour: parts may pass through each other")  # fmt: skip
+    for name, text in (
+        ("smooth-points", "smooth around the points"),
+        ("in-front", "keep what is visible in front of the plane, where it is not trimmed"),
+        ("in-order", "let no part pass through another"),
+    ):
+        add(f"--{name}", action=argparse.BooleanOptionalAction, default=True,
+            help=f"{text} (default: yes; the paper: no)")  # fmt: skip
     add("--min-gap", type=float, default=default.min_gap, metavar="G",
         help="smallest gap in depth between parts, in the input's unit (default: %(default)s)")  # fmt: skip
     add("--alpha", type=float, metavar="A", help="largest compression ratio (default: no compression)")
@@ -216,6 +233,8 @@ def _add_params(command: argparse.ArgumentParser) -> None:
     add("--attach", type=_integers, default=(), metavar="N[,N...]",
         help="vertices to hold on the plane, bounded mode only")  # fmt: skip
     add("--seed", type=int, default=default.seed, metavar="N", help="default: %(default)s")
+    # These are in parameter files only: one for each vertex, one for each point.
+    command.set_defaults(weights=default.weights, point_edits=default.point_edits)
 
 
 def _add_plate(command: argparse.ArgumentParser) -> None:
@@ -313,5 +332,4 @@ def chosen_params(options: argparse.Namespace) -> ReliefParams:
     ParameterError
         A value out of its range.
     """
-    names = [name for name in ReliefParams.__dataclass_fields__ if name != "weights"]  # one for each vertex
-    return ReliefParams(**{name: getattr(options, name) for name in names})
+    return ReliefParams(**{name: getattr(options, name) for name in ReliefParams.__dataclass_fields__})

@@ -157,6 +157,10 @@ def _check_places(options: argparse.Namespace) -> set[Path]:
     taken = {options.input.resolve(): "the input", options.output.resolve(): "the output"}
     if len(taken) == 1:
         raise FileError(f"{options.output} is the input, which would be lost: choose another output.")
+    if options.params is not None:
+        if options.params.resolve() == options.output.resolve():
+            raise FileError(f"{options.output} is the parameter file: choose another output.")
+        taken[options.params.resolve()] = "the parameter file"
     for name, path in (
         ("report", options.report),
         ("picture", options.walls),

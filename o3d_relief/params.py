@@ -5,109 +5,27 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from numbers import Integral
 from typing import Any
 
 from o3d_relief.errors import ParameterError
+from o3d_relief.param_checks import (
+    Triple,
+    check_beta,
+    check_direction,
+    check_indices,
+    check_integer,
+    check_number,
+    check_range,
+    check_triple,
+    check_weights,
+)
+from o3d_relief.point_edits import PointEdit, check_edits
 
-__all__ = ["ReliefParams", "View"]
-
-_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-
-Triple = tuple[float, float, float]
-
-
-def check_number(name: str, value: object) -> float:
-    if isinstance(value, bool | str) or type(value).__name__ == "bool":  # numpy's bool, too
-        raise ParameterError(f"{name} must be a number. Got {value!r} instead.")
-    try:
-        number = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError, OverflowError):
-        raise ParameterError(f"{name} must be a number. Got {value!r} instead.") from None
-    if not math.isfinite(number):
-        raise ParameterError(f"{name} must be finite. Got {value!r} instead.")
-    return number
-
-
-def check_range(name: str, value: object, low: float, high: float = math.inf) -> float:
-    number = check_number(name, value)
-    if not low <= number <= high:
-        wanted = f"at least {low:g}" if high > 1e6 else f"between {low:g} and {high:g}"
-        raise ParameterError(f"{name} must be {wanted}. Got {value!r} instead.")
-    return number
-
-
-def _check_integer(name: str, value: object, low: int, high: int) -> int:
-    number = check_number(name, value)
-    if number != int(number):
-        raise ParameterError(f"{name} must be a whole number. Got {value!r} instead.")
-    return int(check_range(name, int(number), low, high))
-
-
-def _check_triple(name: str, value: object) -> Triple:
-    try:
-        items: tuple[object, ...] = () if isinstance(value, str) else tuple(value)  # type: ignore[arg-type]
-    except TypeError:
-        items = ()
-    if len(items) != 3:
-        raise ParameterError(f"{name} must be three numbers. Got {value!r} instead.")
-    x, y, z = (check_number(name, item) for item in items)
-    return (x, y, z)
-
-
-def _check_direction(name: str, value: object) -> Triple:
-    """Turn 'x', '-y', ... or three numbers into a direction."""
-    if isinstance(value, str):
-        axis = _AXES.get(value.lower().lstrip("+-"))
-        if axis is None or len(value) > 2:
-            raise ParameterError(
-                f"{name} must be x, -x, y, -y, z, -z or three numbers. Got {value!r} instead."
-            )
-        sign = -1.0 if value.startswith("-") else 1.0
-        return (sign * axis[0] + 0.0, sign * axis[1] + 0.0, sign * axis[2] + 0.0)
-    x, y, z = _check_triple(name, value)
-    largest = max(abs(x), abs(y), abs(z))
-    if largest == 0.0:
-        raise ParameterError(f"{name} must not be the zero vector. Got {value!r} instead.")
-    # Only the direction counts; its squares must neither overflow nor vanish.
-    return (x / largest + 0.0, y / largest + 0.0, z / largest + 0.0)
+__all__ = ["ReliefParams", "Triple", "View"]
 
 
 def _words(direction: Triple) -> str:
     return ", ".join(f"{c:g}" for c in direction)
-
-
-def _check_beta(value: float | Sequence[float]) -> float | tuple[float, ...]:
-    if isinstance(value, int | float | str):
-        return check_range("beta", value, 0.0)
-    try:
-        items = tuple(value)
-    except TypeError:  # one number of another kind
-        return check_range("beta", value, 0.0)
-    return tuple(check_range("beta", item, 0.0) for item in items)
-
-
-def _check_indices(name: str, values: object) -> tuple[int, ...]:
-    try:
-        items: tuple[object, ...] = () if isinstance(values, str) else tuple(values)  # type: ignore[arg-type]
-    except TypeError:
-        items = (None,)
-    if isinstance(values, str) or any(
-        isinstance(item, bool) or not isinstance(item, Integral) or item < 0 for item in items
-    ):
-        raise ParameterError(f"{name} must be numbers of vertices, each at least 0. Got {values!r} instead.")
-    return tuple(int(item) for item in items)  # type: ignore[call-overload]
-
-
-def _check_weights(name: str, values: object) -> tuple[float, ...]:
-    try:
-        items = tuple(float(item) for item in values)  # type: ignore[attr-defined]
-    except (TypeError, ValueError):
-        raise ParameterError(f"{name} must be one number for each vertex. Got {values!r} instead.") from None
-    wrong = [item for item in items if not 0.0 < item < math.inf]
-    if wrong:
-        raise ParameterError(f"{name} must be finite and greater than 0. Got {wrong[0]!r} instead.")
-    return items
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,8 +63,8 @@ class View:
     vanishing_point: Triple | None = None
 
     def __post_init__(self) -> None:
-        front = _check_direction("front", self.front)
-        up = _check_direction("up", self.up)
+        front = check_direction("front", self.front)
+        up = check_direction("up", self.up)
         cross = math.hypot(
             front[1] * up[2] - front[2] * up[1],
             front[2] * up[0] - front[0] * up[2],
@@ -162,7 +80,7 @@ class View:
         for name in ("viewpoint", "vanishing_point"):
             value = getattr(self, name)
             if value is not None:
-                object.__setattr__(self, name, _check_triple(name, value))
+                object.__setattr__(self, name, check_triple(name, value))
         if self.vanishing_point is not None and self.vanishing_point[2] >= 0.0:
             raise ParameterError(
                 "vanishing_point must lie behind the relief plane (z < 0). "
@@ -230,6 +148,9 @@ class ReliefParams:
         for the rest (10 on a face keeps the face). Bounded mode only.
     seed : int
         Seed of the clustering.
+    point_edits : sequence of PointEdit
+        Changes of single attenuation points by hand; where two concern the same point, the later counts.
+        Without effect in bounded mode, which has no such points.
 
     Raises
     ------
@@ -259,6 +180,7 @@ class ReliefParams:
     attach: Sequence[int] = ()
     weights: Sequence[float] | None = None
     seed: int = 0
+    point_edits: Sequence[PointEdit] = ()
 
     @classmethod
     def paper(cls, **values: Any) -> ReliefParams:
@@ -278,8 +200,8 @@ class ReliefParams:
 
     def __post_init__(self) -> None:
         set_field = object.__setattr__
-        set_field(self, "k", _check_integer("k", self.k, 1, 2**31 - 1))
-        set_field(self, "beta", _check_beta(self.beta))
+        set_field(self, "k", check_integer("k", self.k, 1, 2**31 - 1))
+        set_field(self, "beta", check_beta(self.beta))
         for name in ("discard_above", "attach_below", "max_order_error", "blend"):
             set_field(self, name, check_range(name, getattr(self, name), 0.0, 1.0))
         if self.attach_below > self.discard_above:
@@ -293,7 +215,8 @@ class ReliefParams:
         set_field(self, "min_gap", check_range("min_gap", self.min_gap, 0.0))
         if self.min_gap > 0.0 and not self.in_order:
             raise ParameterError("min_gap needs in_order: a gap cannot be kept where the order is not.")
-        set_field(self, "seed", _check_integer("seed", self.seed, 0, 2**32 - 1))
+        set_field(self, "seed", check_integer("seed", self.seed, 0, 2**32 - 1))
+        set_field(self, "point_edits", check_edits(self.point_edits))
         self._check_compression()
         self._check_mode()
 
@@ -305,9 +228,9 @@ class ReliefParams:
     def _check_mode(self) -> None:
         if self.mode not in (None, "attenuation", "bounded"):
             raise ParameterError(f'mode must be "attenuation" or "bounded". Got {self.mode!r} instead.')
-        object.__setattr__(self, "attach", _check_indices("attach", self.attach))
+        object.__setattr__(self, "attach", check_indices("attach", self.attach))
         if self.weights is not None:
-            object.__setattr__(self, "weights", _check_weights("weights", self.weights))
+            object.__setattr__(self, "weights", check_weights("weights", self.weights))
         if not self.bounded:
             if self.attach or self.weights is not None:
                 name = "attach" if self.attach else "weights"

@@ -12,6 +12,7 @@ import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
+from o3d_relief.attenuation_step import attenuation_step
 from o3d_relief.bounded_step import bounded_step
 from o3d_relief.bounds.certificate import Certificate, certify
 from o3d_relief.errors import MeshError, ParameterError
@@ -26,7 +27,6 @@ from o3d_relief.scene.scan import scan_points
 from o3d_relief.scene.weld import weld
 from o3d_relief.stages.trim import Trimmed
 from o3d_relief.steps import (
-    attenuation_step,
     clusters_step,
     compression_step,
     construction_step,
@@ -227,7 +227,7 @@ def make_relief(
         z = journal.keep(bounded_step(vertices, faces, visible, scene, params)).z
     else:
         clusters = journal.keep(clusters_step(vertices, params))
-        points = journal.keep(attenuation_step(vertices, visible, clusters, params))
+        points = journal.keep(attenuation_step(vertices, visible, scene, clusters, params))
         pairs = stacked_pairs(vertices, faces, params)
         z = journal.keep(
             construction_step(vertices, faces, visible, laplacian, slivers, clusters, points, pairs)

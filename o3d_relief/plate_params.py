@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from o3d_relief.errors import ParameterError
-from o3d_relief.params import check_number, check_range
+from o3d_relief.param_checks import check_number, check_range
 
 __all__ = ["HANGINGS", "LOOSE", "PRINT_DIRECTIONS", "SHAPES", "PlateParams"]
 

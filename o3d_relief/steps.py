@@ -9,6 +9,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
+from o3d_relief.attenuation_step import beta_of_clusters
 from o3d_relief.bounds.order import keep_order
 from o3d_relief.bounds.pairs import Pairs, grid_pairs, vertex_pairs
 from o3d_relief.bounds.parts import tie_parts
@@ -29,15 +30,7 @@ from o3d_relief.records import (
 from o3d_relief.scene.frame import RELIEF_UNITS, Frame, relief_frame, to_relief_units
 from o3d_relief.scene.weld import weld
 from o3d_relief.scene.winding import wrongly_wound
-from o3d_relief.stages.attenuation import (
-    actions,
-    attenuate,
-    differentials,
-    nearest_neighbours,
-    new_heights,
-    relative_differentials,
-    select_points,
-)
+from o3d_relief.stages.attenuation import attenuate
 from o3d_relief.stages.clustering import cluster_vertices
 from o3d_relief.stages.compression import alpha_for_depth, compress
 from o3d_relief.stages.construction import construct
@@ -139,52 +132,6 @@ def clusters_step(vertices: NDArray[np.float64], params: ReliefParams) -> Cluste
     )
 
 
-def _beta_of_points(params: ReliefParams, cluster: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Return the attenuation factor of each point; a sequence counts by points or by clusters."""
-    if isinstance(params.beta, float | int):
-        return np.full(len(cluster), float(params.beta))
-    beta = np.array(params.beta, dtype=np.float64)
-    if len(beta) == params.k:
-        return np.asarray(beta[cluster])
-    if len(beta) == len(cluster):
-        return beta
-    raise ParameterError(
-        f"beta must be one number or one for each of the {len(cluster)} attenuation points. "
-        f"Got {len(beta)} numbers instead."
-    )
-
-
-def attenuation_step(
-    vertices: NDArray[np.float64], visible: NDArray[np.bool_], clusters: ClustersStage, params: ReliefParams
-) -> AttenuationStage:
-    """Choose the attenuation points and find their new heights."""
-    index, cluster = select_points(vertices, visible, clusters.labels, clusters.centers)
-    height = vertices[index, 2]
-    differential = differentials(height, nearest_neighbours(vertices[index, :2], symmetric=False))
-    rho = relative_differentials(differential)
-    beta = _beta_of_points(params, cluster)
-    action = actions(rho, discard_above=params.discard_above, attach_below=params.attach_below)
-    settled = new_heights(vertices[index], rho, action, beta)
-    return AttenuationStage(
-        index=index,
-        cluster=cluster,
-        height=height,
-        differential=differential,
-        rho=rho,
-        beta=beta,
-        action=settled.action,
-        new_height=settled.new_height,
-        counts={
-            "points": len(index),
-            "clusters_without_visible_vertex": len(clusters.centers) - len(index),
-            "attach": int((settled.action == "attach").sum()),
-            "scale": int((settled.action == "scale").sum()),
-            "discard": int((settled.action == "discard").sum()),
-            "groups_attached": settled.groups_attached,
-        },
-    )
-
-
 def _behind(z: NDArray[np.float64], visible: NDArray[np.bool_]) -> int:
     return int((z[visible] < 0.0).sum())
 
@@ -209,7 +156,7 @@ def construction_step(
     """Rebuild the surface around the points, with its loose parts tied to the rest."""
     ties = None
     if pairs is not None:
-        beta = _beta_of_clusters(points, len(clusters.centers))[clusters.labels[pairs.upper[:, 0]]]
+        beta = beta_of_clusters(points, len(clusters.centers))[clusters.labels[pairs.upper[:, 0]]]
         shrink = attenuate(pairs.gap, beta)
         ties = tie_parts(vertices, faces, laplacian, points.kept_index, pairs, shrink)
     built = construct(
@@ -234,13 +181,6 @@ def construction_step(
             "ties_to_nearest": ties.to_nearest,
         }
     return ConstructionStage(z=built.z, counts=counts)
-
-
-def _beta_of_clusters(points: AttenuationStage, clusters: int) -> NDArray[np.float64]:
-    """Return the attenuation factor of each cluster; one without a point takes the median."""
-    beta = np.full(clusters, float(np.median(points.beta)))
-    beta[points.cluster] = points.beta
-    return beta
 
 
 def restoration_step(

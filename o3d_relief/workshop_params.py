@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from o3d_relief.errors import ParameterError
-from o3d_relief.params import check_number, check_range
+from o3d_relief.param_checks import check_number, check_range
 
 __all__ = ["PIN_WALL", "MillParams", "TileParams"]
 

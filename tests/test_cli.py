@@ -1,3 +1,4 @@
+import dataclasses
 import json
 import os
 import signal
@@ -9,6 +10,7 @@ import numpy as np
 import open3d as o3d
 import pytest
 
+from o3d_relief import PointEdit, ReliefParams, View, make_relief, save_params
 from o3d_relief.arguments import parse
 from o3d_relief.cli import main
 from o3d_relief.scan_arguments import chosen_scan
@@ -119,9 +121,45 @@ def test_every_option_reaches_the_relief(tmp_path, scene):
         "max_order_error": 0.4, "blend": 0.5, "alpha": 0.7, "alpha_min": 0.2, "depth": None,
         "mode": None, "attach": [],
         "smooth_points": False, "in_front": False, "in_order": False, "min_gap": 0.0, "seed": 3,
+        "point_edits": [],
     }  # fmt: skip
     assert values["view"]["viewpoint"] == [0, 0, 900]
     assert values["view"]["vanishing_point"] == [0, 0, -400]
+
+
+def test_a_parameter_file_is_replayed_exactly(tmp_path, scene):
+    params = ReliefParams(
+        k=16, beta=1 / 3, alpha=0.7, in_order=False, seed=2, point_edits=[PointEdit(vertex=300, beta=0.01)]
+    )
+    view = View(front="-y", up="z")
+    save_params(tmp_path / "params.json", params, view)
+    file = ["--params", str(tmp_path / "params.json")]
+    assert main(["make", str(scene), str(tmp_path / "r.ply"), *file]) == 0
+    expected = make_relief(read_mesh(scene), params, view=view).mesh
+    made = read_mesh(tmp_path / "r.ply")
+    assert (np.asarray(made.vertices) == np.asarray(expected.vertices)).all()
+    assert (np.asarray(made.triangles) == np.asarray(expected.triangles)).all()
+
+    report = tmp_path / "report.json"
+    beside = ["--beta", "0.5", "--in-order", "--front", "z", "--up", "y", "--report", str(report)]
+    assert main(["make", str(scene), str(tmp_path / "r.ply"), *beside, *file]) == 0
+    values = json.loads(report.read_text())
+    expected = dataclasses.asdict(dataclasses.replace(params, beta=0.5, in_order=True))
+    del expected["weights"]
+    assert values["params"] == json.loads(json.dumps(expected))
+    assert values["view"]["front"] == [0, 0, 1]
+
+
+def test_parameter_files_that_cannot_be_used(tmp_path, scene, capsys):
+    file, out = tmp_path / "params.json", tmp_path / "r.ply"
+    assert "does not exist" in _fails(capsys, "make", scene, out, "--params", file)
+    file.write_text('{"params": {"kk": 3}}')
+    assert "'kk' is not known in params" in _fails(capsys, "make", scene, out, "--params", file)
+    file.write_text('{"params": {"alpha": 0.5}}')
+    assert "exclude each other" in _fails(capsys, "make", scene, out, "--params", file, "--depth", "3")
+    assert "is the parameter file" in _fails(capsys, "make", scene, file, "--params", file)
+    assert "is the parameter file" in _fails(capsys, "make", scene, out, "--params", file, "--report", file)
+    assert _files(tmp_path) == ["params.json", "scene.ply"]
 
 
 def test_nothing_is_overwritten_by_mistake(tmp_path, scene, capsys):

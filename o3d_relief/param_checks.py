@@ -1,0 +1,121 @@
+"""Checks of the parameters' values: each returns plain Python, or says what is wrong."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from numbers import Integral
+
+from o3d_relief.errors import ParameterError
+
+__all__ = [
+    "Triple",
+    "check_beta",
+    "check_direction",
+    "check_indices",
+    "check_integer",
+    "check_number",
+    "check_range",
+    "check_triple",
+    "check_weights",
+]
+
+_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+Triple = tuple[float, float, float]
+
+
+def check_number(name: str, value: object) -> float:
+    """Return a finite number as a float."""
+    if isinstance(value, bool | str) or type(value).__name__ == "bool":  # numpy's bool, too
+        raise ParameterError(f"{name} must be a number. Got {value!r} instead.")
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        raise ParameterError(f"{name} must be a number. Got {value!r} instead.") from None
+    if not math.isfinite(number):
+        raise ParameterError(f"{name} must be finite. Got {value!r} instead.")
+    return number
+
+
+def check_range(name: str, value: object, low: float, high: float = math.inf) -> float:
+    """Return a number between two others as a float."""
+    number = check_number(name, value)
+    if not low <= number <= high:
+        wanted = f"at least {low:g}" if high > 1e6 else f"between {low:g} and {high:g}"
+        raise ParameterError(f"{name} must be {wanted}. Got {value!r} instead.")
+    return number
+
+
+def check_integer(name: str, value: object, low: int, high: int) -> int:
+    """Return a whole number between two others as an int."""
+    number = check_number(name, value)
+    if number != int(number):
+        raise ParameterError(f"{name} must be a whole number. Got {value!r} instead.")
+    return int(check_range(name, int(number), low, high))
+
+
+def check_triple(name: str, value: object) -> Triple:
+    """Return three numbers as a tuple."""
+    try:
+        items: tuple[object, ...] = () if isinstance(value, str) else tuple(value)  # type: ignore[arg-type]
+    except TypeError:
+        items = ()
+    if len(items) != 3:
+        raise ParameterError(f"{name} must be three numbers. Got {value!r} instead.")
+    x, y, z = (check_number(name, item) for item in items)
+    return (x, y, z)
+
+
+def check_direction(name: str, value: object) -> Triple:
+    """Turn 'x', '-y', ... or three numbers into a direction."""
+    if isinstance(value, str):
+        axis = _AXES.get(value.lower().lstrip("+-"))
+        if axis is None or len(value) > 2:
+            raise ParameterError(
+                f"{name} must be x, -x, y, -y, z, -z or three numbers. Got {value!r} instead."
+            )
+        sign = -1.0 if value.startswith("-") else 1.0
+        return (sign * axis[0] + 0.0, sign * axis[1] + 0.0, sign * axis[2] + 0.0)
+    x, y, z = check_triple(name, value)
+    largest = max(abs(x), abs(y), abs(z))
+    if largest == 0.0:
+        raise ParameterError(f"{name} must not be the zero vector. Got {value!r} instead.")
+    # Only the direction counts; its squares must neither overflow nor vanish.
+    return (x / largest + 0.0, y / largest + 0.0, z / largest + 0.0)
+
+
+def check_beta(value: float | Sequence[float]) -> float | tuple[float, ...]:
+    """Return one attenuation factor, or several as a tuple."""
+    if isinstance(value, int | float | str):
+        return check_range("beta", value, 0.0)
+    try:
+        items = tuple(value)
+    except TypeError:  # one number of another kind
+        return check_range("beta", value, 0.0)
+    return tuple(check_range("beta", item, 0.0) for item in items)
+
+
+def check_indices(name: str, values: object) -> tuple[int, ...]:
+    """Return numbers of vertices as a tuple."""
+    try:
+        items: tuple[object, ...] = () if isinstance(values, str) else tuple(values)  # type: ignore[arg-type]
+    except TypeError:
+        items = (None,)
+    if isinstance(values, str) or any(
+        isinstance(item, bool) or not isinstance(item, Integral) or item < 0 for item in items
+    ):
+        raise ParameterError(f"{name} must be numbers of vertices, each at least 0. Got {values!r} instead.")
+    return tuple(int(item) for item in items)  # type: ignore[call-overload]
+
+
+def check_weights(name: str, values: object) -> tuple[float, ...]:
+    """Return positive numbers as a tuple."""
+    try:
+        items = tuple(float(item) for item in values)  # type: ignore[attr-defined]
+    except (TypeError, ValueError):
+        raise ParameterError(f"{name} must be one number for each vertex. Got {values!r} instead.") from None
+    wrong = [item for item in items if not 0.0 < item < math.inf]
+    if wrong:
+        raise ParameterError(f"{name} must be finite and greater than 0. Got {wrong[0]!r} instead.")
+    return items
