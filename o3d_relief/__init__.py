@@ -6,7 +6,15 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from o3d_relief.errors import DisplayError, FileError, MeshError, ParameterError, ReliefError, SolverError
+    from o3d_relief.errors import (
+        Cancelled,
+        DisplayError,
+        FileError,
+        MeshError,
+        ParameterError,
+        ReliefError,
+        SolverError,
+    )
     from o3d_relief.linalg.laplacian import cotangent_laplacian
     from o3d_relief.measure import ReliefQuality, Yardstick, measure_relief
     from o3d_relief.params import ReliefParams, View
@@ -37,6 +45,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "Cancelled",
     "DisplayError",
     "FileError",
     "MeshError",
@@ -85,6 +94,7 @@ __all__ = [
 ]
 
 _HOME = {
+    "Cancelled": "errors",
     "DisplayError": "errors",
     "FileError": "errors",
     "MeshError": "errors",

@@ -121,7 +121,7 @@ def _beta(text: str) -> float | tuple[float, ...]:
 
 
 def _parser(replaced: dict[str, Any]) -> argparse.ArgumentParser:
-    """Build the parser; `replaced` holds values in place of the defaults of the command "make"."""
+    """Build the parser; `replaced` holds values in place of the defaults of the commands."""
     parser = _Parser(prog="o3d-relief", description="Make high reliefs from 3D scenes.", allow_abbrev=False)
     parser.add_argument("--version", action="version", version=f"o3d-relief {__version__}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND", dest="command")
@@ -152,10 +152,10 @@ def _parser(replaced: dict[str, Any]) -> argparse.ArgumentParser:
     )
 
     _add_limit(make)
-    add_windows(
-        commands, _FORMATS, [_add_view, _add_params, lambda command: add_scan(command, _point), _add_limit]
-    )
     make.set_defaults(**replaced)
+
+    shared = [_add_view, _add_params, lambda command: add_scan(command, _point), _add_limit]
+    add_windows(commands, _FORMATS, shared, replaced)
 
     demo = commands.add_parser(
         "demo",

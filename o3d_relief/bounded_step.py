@@ -14,6 +14,7 @@ from o3d_relief.bounds.seen import face_weights, point_rows, seen_faces, seen_po
 from o3d_relief.errors import ParameterError
 from o3d_relief.linalg.laplacian import cotangent_laplacian
 from o3d_relief.params import ReliefParams
+from o3d_relief.progress import Tick, silent
 from o3d_relief.records import BoundedStage, SceneStage
 from o3d_relief.steps import on_plane
 
@@ -30,6 +31,8 @@ def bounded_step(
     visible: NDArray[np.bool_],
     scene: SceneStage,
     params: ReliefParams,
+    *,
+    tick: Tick = silent,
 ) -> BoundedStage:
     """Find the closest relief of the wanted depth."""
     z, n = vertices[:, 2], len(vertices)
@@ -63,6 +66,7 @@ def bounded_step(
         pull=np.zeros(n) if ties is None else ties.among_held_pull,
         min_gap=params.min_gap / scene.unit,
         attach=attached,
+        tick=tick,
     )
     counts = {
         "already_shallower": 0,

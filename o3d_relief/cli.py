@@ -67,6 +67,7 @@ def _demo(options: argparse.Namespace) -> int:
     import numpy as np
 
     from o3d_relief.pipeline import make_relief
+    from o3d_relief.progress_bar import StageBar
     from o3d_relief.scene.demo import demo_scene
     from o3d_relief.scene.write import write_mesh
     from o3d_relief.show.render import save_png
@@ -75,7 +76,11 @@ def _demo(options: argparse.Namespace) -> int:
     started = time.perf_counter()
     scene = demo_scene()
     tell(f"built-in scene: {len(scene.vertices)} vertices, {len(scene.triangles)} triangles")
-    relief = make_relief(scene, ReliefParams(alpha=0.8), on_stage=tell_stage)
+    bar = StageBar()
+    try:
+        relief = make_relief(scene, ReliefParams(alpha=0.8), on_stage=tell_stage, on_progress=bar)
+    finally:
+        bar.close()
     write_mesh(folder / "scene.ply", scene)
     write_mesh(folder / "relief.ply", relief.mesh)
     write_mesh(folder / "relief.glb", relief.mesh)

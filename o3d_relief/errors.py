@@ -1,6 +1,14 @@
 """The errors that this package raises: one clear sentence each."""
 
-__all__ = ["DisplayError", "FileError", "MeshError", "ParameterError", "ReliefError", "SolverError"]
+__all__ = [
+    "Cancelled",
+    "DisplayError",
+    "FileError",
+    "MeshError",
+    "ParameterError",
+    "ReliefError",
+    "SolverError",
+]
 
 
 class ReliefError(Exception):
@@ -17,6 +25,10 @@ class MeshError(ReliefError, ValueError):
 
 class FileError(ReliefError, OSError):
     """A file that cannot be read or written."""
+
+
+class Cancelled(ReliefError):  # noqa: N818, it is no error of anybody
+    """The work was called off by the caller's `on_progress`."""
 
 
 class SolverError(ReliefError, RuntimeError):

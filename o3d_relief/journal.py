@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TypeVar
 
+from o3d_relief.progress import OnProgress, Progress
 from o3d_relief.records import StageRecord
 
 __all__ = ["Journal", "OnStage"]
@@ -24,11 +25,20 @@ class Journal:
         Called with each record.
     stages : mapping of str to StageRecord, optional
         Records of what came before.
+    on_progress : callable, optional
+        Told how far the stages are, see `o3d_relief.progress`.
     """
 
-    def __init__(self, on_stage: OnStage | None, stages: Mapping[str, StageRecord] | None = None) -> None:
+    def __init__(
+        self,
+        on_stage: OnStage | None,
+        stages: Mapping[str, StageRecord] | None = None,
+        on_progress: OnProgress | None = None,
+    ) -> None:
         self.stages: dict[str, StageRecord] = dict(stages or {})
         self._on_stage = on_stage
+        self._progress = Progress(on_progress)
+        self.begin, self.tick = self._progress.begin, self._progress.tick
         self._since = time.perf_counter()
 
     def keep(self, record: _Record) -> _Record:
@@ -42,8 +52,14 @@ class Journal:
         -------
         StageRecord
             The record with its time.
+
+        Raises
+        ------
+        Cancelled
+            The caller has called the work off.
         """
         timed = replace(record, seconds=time.perf_counter() - self._since)
+        self._progress.end()
         self.stages[timed.name] = timed
         if self._on_stage is not None:
             self._on_stage(timed)

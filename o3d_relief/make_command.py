@@ -51,6 +51,7 @@ def make(options: argparse.Namespace) -> int:
 
     from o3d_relief.making import make_checked, tell_estimate
     from o3d_relief.pipeline import make_relief
+    from o3d_relief.progress_bar import StageBar
     from o3d_relief.scene.scan import scan_points
     from o3d_relief.scene.write import lost_attributes
     from o3d_relief.solid.estimate import relief_depth
@@ -61,17 +62,27 @@ def make(options: argparse.Namespace) -> int:
     if meshing is None and plate is None:
         for note in lost_attributes(options.output, scene):
             tell(note)
+    bar = StageBar()
     try:
         if meshing is not None and (options.dry_run or plate is not None):
             # Its size must be known before the relief is made.
-            scene, meshing = scan_points(scene, meshing, view=view, on_stage=tell_stage).mesh, None
+            scene, meshing = (
+                scan_points(scene, meshing, view=view, on_stage=tell_stage, on_progress=bar).mesh,
+                None,
+            )
         if options.dry_run:
             tell_estimate(scene, params, view, plate or PlateParams(), tell)
             return 0
         if plate is not None and plate.depth_mm is not None:
             params = replace(params, depth=relief_depth(scene, view, plate))
         relief = make_relief(
-            scene, params, view=view, scan=meshing, on_stage=tell_stage, max_triangles=options.max_triangles
+            scene,
+            params,
+            view=view,
+            scan=meshing,
+            on_stage=tell_stage,
+            on_progress=bar,
+            max_triangles=options.max_triangles,
         )
         made = None
         if plate is not None:
@@ -79,6 +90,8 @@ def make(options: argparse.Namespace) -> int:
             made = make_checked(relief, plate, tell, mill=mill, undercut_free=free, tiles=tiles)
     except MeshError as error:
         raise MeshError(f"{options.input}: {error}") from error
+    finally:
+        bar.close()
     _write(options, relief, made, taken)
     tell_result(options.output, relief, time.perf_counter() - started, solid=made is not None)
     return 3 if options.strict and made is not None and made.report.verdict != "pass" else 0

@@ -20,6 +20,7 @@ from o3d_relief.journal import Journal, OnStage
 from o3d_relief.linalg.laplacian import cotangent_laplacian
 from o3d_relief.output import trimmed_mesh
 from o3d_relief.params import ReliefParams, View
+from o3d_relief.progress import OnProgress
 from o3d_relief.records import StageRecord, TrimStage, final_heights
 from o3d_relief.scan_params import ScanParams
 from o3d_relief.scene.convert import mesh_arrays
@@ -163,6 +164,7 @@ def make_relief(
     view: View | None = None,
     scan: ScanParams | None = None,
     on_stage: OnStage | None = None,
+    on_progress: OnProgress | None = None,
     max_triangles: int | None = None,
 ) -> Relief:
     """Make a high relief of a scene.
@@ -181,6 +183,10 @@ def make_relief(
         How a point cloud is meshed.
     on_stage : callable, optional
         Called with each stage's record as soon as the stage is done.
+    on_progress : callable, optional
+        Called with the name of the stage and the share of it that is done, None where that is not known: when
+        a stage begins and ends, and in every round of long ones. It must be quick. Where it returns False, or
+        raises, the work ends.
     max_triangles : int, optional
         Larger meshes are refused; 10,000,000 where omitted.
 
@@ -196,6 +202,8 @@ def make_relief(
         A parameter that does not fit the scene.
     SolverError
         A linear system that could not be solved.
+    Cancelled
+        `on_progress` returned False.
 
     Examples
     --------
@@ -210,32 +218,48 @@ def make_relief(
             raise ParameterError(f"{name} must be a {kind.__name__}. Got {value!r} instead.")
     scanned = None
     if isinstance(mesh, o3d.geometry.PointCloud):
-        scanned = scan_points(mesh, scan, view=view, on_stage=on_stage)
+        scanned = scan_points(mesh, scan, view=view, on_stage=on_stage, on_progress=on_progress)
         mesh = scanned.mesh
     elif scan is not None:
         raise ParameterError("scan says how a point cloud is meshed, but the scene is a mesh: leave it out.")
-    journal = Journal(on_stage, None if scanned is None else scanned.stages)
+    journal = Journal(on_stage, None if scanned is None else scanned.stages, on_progress)
 
+    journal.begin("scene")
     in_vertices, in_faces = mesh_arrays(mesh, max_triangles)
     frame = frame_step(in_vertices, in_faces, view)
     scene = journal.keep(scene_step(in_vertices, in_faces, frame, params))
     faces = scene.faces
+    journal.begin("perspective")
     vertices = journal.keep(perspective_step(scene.vertices, view)).vertices
+    journal.begin("visibility")
     visible = journal.keep(visibility_step(vertices, faces, view)).visible
+    journal.begin("bounded" if params.bounded else "clusters")
     laplacian, slivers = cotangent_laplacian(vertices, faces)
     if params.bounded:
-        z = journal.keep(bounded_step(vertices, faces, visible, scene, params)).z
+        z = journal.keep(bounded_step(vertices, faces, visible, scene, params, tick=journal.tick)).z
     else:
         clusters = journal.keep(clusters_step(vertices, params))
+        journal.begin("attenuation")
         points = journal.keep(attenuation_step(vertices, visible, scene, clusters, params))
+        journal.begin("construction")
         pairs = stacked_pairs(vertices, faces, params)
         z = journal.keep(
-            construction_step(vertices, faces, visible, laplacian, slivers, clusters, points, pairs)
+            construction_step(
+                vertices, faces, visible, laplacian, slivers, clusters, points, pairs, tick=journal.tick
+            )
         ).z
-        z = journal.keep(restoration_step(vertices, visible, laplacian, z, clusters, points, params)).z
-        z = journal.keep(order_step(vertices, faces, visible, laplacian, z, pairs, params, scene.unit)).z
+        journal.begin("restoration")
+        z = journal.keep(
+            restoration_step(vertices, visible, laplacian, z, clusters, points, params, tick=journal.tick)
+        ).z
+        journal.begin("order")
+        z = journal.keep(
+            order_step(vertices, faces, visible, laplacian, z, pairs, params, scene.unit, tick=journal.tick)
+        ).z
+        journal.begin("compression")
         z = journal.keep(compression_step(z, params, scene.unit)).z
 
+    journal.begin("trim")
     out_faces, turned = turned_to_viewer(in_faces, scene, vertices, visible, laplacian)
     trimmed = trim_step(in_vertices, out_faces, frame, scene, vertices, z)
     if len(trimmed.faces) == 0:

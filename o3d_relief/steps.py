@@ -16,6 +16,7 @@ from o3d_relief.bounds.parts import tie_parts
 from o3d_relief.errors import MeshError, ParameterError
 from o3d_relief.linalg.laplacian import vertex_areas
 from o3d_relief.params import ReliefParams, Triple, View
+from o3d_relief.progress import Tick, silent
 from o3d_relief.records import (
     AttenuationStage,
     ClustersStage,
@@ -152,6 +153,8 @@ def construction_step(
     clusters: ClustersStage,
     points: AttenuationStage,
     pairs: Pairs | None,
+    *,
+    tick: Tick = silent,
 ) -> ConstructionStage:
     """Rebuild the surface around the points, with its loose parts tied to the rest."""
     ties = None
@@ -166,6 +169,7 @@ def construction_step(
         points.kept_height,
         among_held=None if ties is None else (ties.among_held, ties.among_held_pull),
         to_loose=None if ties is None else (ties.to_loose, ties.to_loose_pull),
+        tick=tick,
     )
     counts = {
         "fixed_points": len(points.kept_index),
@@ -191,6 +195,8 @@ def restoration_step(
     clusters: ClustersStage,
     points: AttenuationStage,
     params: ReliefParams,
+    *,
+    tick: Tick = silent,
 ) -> RestorationStage:
     """Find order errors and pimples, and what is visible behind S, and mend them."""
     _, label = connected_components(laplacian, directed=False)
@@ -207,7 +213,7 @@ def restoration_step(
     if params.in_front:
         high |= lifting_discs(vertices, z, label, visible)
     floor = lowest_heights(vertices, visible, share=_KEPT_ON_PLANE) if params.in_front else None
-    restored = restore(vertices, laplacian, z, high, index, label, blend=params.blend, floor=floor)
+    restored = restore(vertices, laplacian, z, high, index, label, blend=params.blend, floor=floor, tick=tick)
     counts |= {
         "solved": int(restored.solved.sum()),
         "points_held": restored.points_held,
@@ -227,6 +233,8 @@ def order_step(
     pairs: Pairs | None,
     params: ReliefParams,
     unit: float,
+    *,
+    tick: Tick = silent,
 ) -> OrderStage:
     """Keep everything in order along the viewing direction."""
     if pairs is None:
@@ -243,6 +251,7 @@ def order_step(
         Pairs.join([pairs, grid_pairs(vertices, faces)]),
         in_front=visible if params.in_front else None,
         min_gap=min_gap,
+        tick=tick,
     )
     counts = {
         "pairs_corrected": ordered.corrected_pairs,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,9 @@ __all__ = ["add_windows"]
 AddOptions = Callable[[argparse.ArgumentParser], None]
 
 
-def add_windows(commands: Any, formats: str, options: Sequence[AddOptions]) -> None:
+def add_windows(
+    commands: Any, formats: str, options: Sequence[AddOptions], replaced: Mapping[str, Any]
+) -> None:
     """Add the command "view".
 
     Parameters
@@ -22,6 +24,8 @@ def add_windows(commands: Any, formats: str, options: Sequence[AddOptions]) -> N
         The kinds of files that can be read.
     options : sequence of callable
         Each adds options of the command "make".
+    replaced : mapping of str to anything
+        Values in place of the defaults.
     """
     view = commands.add_parser(
         "view",
@@ -31,3 +35,4 @@ def add_windows(commands: Any, formats: str, options: Sequence[AddOptions]) -> N
     view.add_argument("input", type=Path, metavar="INPUT", help=f"{formats} file")
     for add in options:
         add(view)
+    view.set_defaults(**replaced)

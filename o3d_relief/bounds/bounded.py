@@ -12,6 +12,7 @@ from o3d_relief.bounds.missed import BetweenLines
 from o3d_relief.bounds.order import out_of_order
 from o3d_relief.bounds.pairs import Pairs
 from o3d_relief.linalg.interior import minimise
+from o3d_relief.progress import Tick, silent
 
 __all__ = ["Bounded", "closest_relief"]
 
@@ -77,6 +78,7 @@ def closest_relief(
     pull: NDArray[np.float64],
     min_gap: float,
     attach: NDArray[np.int64],
+    tick: Tick = silent,
 ) -> Bounded:
     """Find the heights within a depth that change the differential coordinates least.
 
@@ -109,6 +111,8 @@ def closest_relief(
         Smallest gap of pairs that were not closer before.
     attach : (a,) int64
         Vertices to hold on S.
+    tick : callable, optional
+        Called in every round with the share of the work that is done; it may raise to end the work.
 
     Returns
     -------
@@ -151,6 +155,7 @@ def closest_relief(
         rows=sp.vstack([gap_rows(pairs, n), seen]).tocsr(),
         bound=np.concatenate([kept - pairs.gap, -(seen @ z)]),
         more_rows=missed,
+        tick=tick,
     )
     result = place(z + found.x)
     return Bounded(

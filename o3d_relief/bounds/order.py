@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from o3d_relief.bounds.correction import Correction
 from o3d_relief.bounds.crossings import crossings, edges_of
 from o3d_relief.bounds.pairs import Pairs, foot_pairs
+from o3d_relief.progress import Tick, share_of_way, silent
 
 __all__ = ["Ordered", "keep_order", "out_of_order"]
 
@@ -88,6 +89,7 @@ def keep_order(
     *,
     in_front: NDArray[np.bool_] | None = None,
     min_gap: float = 0.0,
+    tick: Tick = silent,
 ) -> Ordered:
     """Correct heights until no pair is out of order, no edge pierces a triangle, nothing visible is behind S.
 
@@ -113,6 +115,9 @@ def keep_order(
         Vertices that must not end behind S.
     min_gap : float
         In relief units.
+    tick : callable, optional
+        Called in every round with the share of the work that is done, as far as the number of pairs that are
+        still out of order tells; it may raise to end the work.
 
     Returns
     -------
@@ -127,7 +132,7 @@ def keep_order(
     system = Correction(vertices, laplacian, areas, z)
     near = faces
     held, floor = np.zeros(len(pairs), dtype=bool), np.zeros(len(z), dtype=bool)
-    current, best, fewest, rounds = z, z, np.inf, 0
+    current, best, fewest, rounds, first = z, z, np.inf, 0, 0
     while True:
         wrong = out_of_order(pairs, current, min_gap=min_gap)
         behind = front & (current < 0.0)
@@ -135,6 +140,8 @@ def keep_order(
         crossing = _new_crossings(vertices, near, edges, current)
         at_foot = foot_pairs(vertices, near, edges, current)
         left = int(wrong.sum() + behind.sum()) + len(crossing) // 2 + len(at_foot)
+        first = first or left
+        tick(share_of_way(first + 1.0, left + 1.0, 1.0))
         if left < fewest:
             best, fewest = current, left
         if left == 0 or rounds == _ROUNDS:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from o3d_relief.linalg.solve import multigrid, solve_direct
+from o3d_relief.progress import Tick, share_of_way, silent
 
 __all__ = ["Minimum", "minimise"]
 
@@ -72,6 +73,7 @@ def minimise(
     bound: Vector,
     more_rows: MoreRows,
     accuracy: float = 0.03,
+    tick: Tick = silent,
 ) -> Minimum:
     """Minimise x' H x / 2 - pull' x  subject to  lower <= x <= upper  and  R x >= bound.
 
@@ -98,13 +100,16 @@ def minimise(
         returned. `start` counts as accepted.
     accuracy : float
         Gap between the objective and its dual, as a share of x' H x / 2, at which the iteration stops.
+    tick : callable, optional
+        Called in every step of the linear solver, and in every round with the share of the way from the first
+        gap to `accuracy`; it may raise to end the work.
 
     Returns
     -------
     Minimum
     """
     with threadpool_limits(limits=1):  # sums that do not depend on the number of threads
-        return _Iteration(form, pull, start, lower, upper, rows, bound).run(accuracy, more_rows)
+        return _Iteration(form, pull, start, lower, upper, rows, bound, tick).run(accuracy, more_rows)
 
 
 class _Iteration:
@@ -119,7 +124,9 @@ class _Iteration:
         upper: Vector,
         rows: sp.csr_array,
         bound: Vector,
+        tick: Tick,
     ) -> None:
+        self.tick = tick
         self.form, self.pull = form, pull
         self.x = start
         self.at_lower, self.at_upper = np.flatnonzero(np.isfinite(lower)), np.flatnonzero(np.isfinite(upper))
@@ -149,11 +156,13 @@ class _Iteration:
 
     def run(self, accuracy: float, more_rows: MoreRows) -> Minimum:
         accepted, share = self.x, np.inf
+        first_share = self._gap() / max(self._energy(), 1e-300)
         next_check = _CHECK_EVERY
         while self.rounds < _ROUNDS:
             longest = self._advance()
             gap = self._gap()
             share = gap / max(self._energy(), 1e-300)
+            self.tick(share_of_way(first_share, share, accuracy))
             close = share <= accuracy
             if close or self.rounds >= next_check:
                 clean = self._go_back(accepted, *more_rows(self.x, accepted))
@@ -246,7 +255,7 @@ class _Iteration:
             system = system + rows.T @ (sp.diags_array(stiffness[2][some]) @ rows)
             right = right + rows.T @ push[2][some]
         self.rounds += 1
-        return _solve(system.tocsr(), right)
+        return _solve(system.tocsr(), right, self.tick)
 
 
 def _room(values: Vector, moves: Vector) -> Vector:
@@ -255,7 +264,7 @@ def _room(values: Vector, moves: Vector) -> Vector:
     return np.where(falling, values / np.where(falling, -moves, 1.0), np.inf)
 
 
-def _solve(matrix: sp.csr_array, right_hand_side: Vector) -> Vector:
+def _solve(matrix: sp.csr_array, right_hand_side: Vector, tick: Tick) -> Vector:
     """Solve to a low accuracy: the next round mends what is missing, and no constraint depends on it."""
     if len(right_hand_side) <= _DIRECT_UP_TO:
         return solve_direct(matrix, right_hand_side)
@@ -266,5 +275,6 @@ def _solve(matrix: sp.csr_array, right_hand_side: Vector) -> Vector:
         atol=0.0,
         maxiter=_LINEAR_STEPS,
         M=multigrid(matrix),
+        callback=lambda _solution: tick(None),
     )
     return np.asarray(solution, dtype=np.float64)

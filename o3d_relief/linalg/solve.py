@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from o3d_relief.errors import SolverError
+from o3d_relief.progress import Tick, silent
 
 __all__ = ["multigrid", "solve_direct", "solve_spd"]
 
@@ -26,6 +27,7 @@ def solve_spd(
     *,
     similar: sp.csr_array | None = None,
     tolerance: float = 1e-12,
+    tick: Tick = silent,
 ) -> NDArray[np.float64]:
     """Solve A x = b for a sparse symmetric positive definite A.
 
@@ -42,6 +44,8 @@ def solve_spd(
         `matrix` itself where omitted.
     tolerance : float
         Norm of the residual relative to that of `right_hand_side` at which the iteration stops.
+    tick : callable, optional
+        Called in every step of the iteration; it may raise to end the work.
 
     Returns
     -------
@@ -64,7 +68,8 @@ def solve_spd(
         if n <= _DIRECT_UP_TO:
             solution = solve_direct(matrix, right_hand_side)
         else:
-            solution = _multigrid(matrix, right_hand_side, matrix if similar is None else similar, tolerance)
+            similar = matrix if similar is None else similar
+            solution = _multigrid(matrix, right_hand_side, similar, tolerance, tick)
         residual = np.linalg.norm(matrix @ solution - right_hand_side)
         reached = float(residual / np.linalg.norm(right_hand_side))
     if not reached <= max(_GOOD_ENOUGH, 10.0 * tolerance):
@@ -133,7 +138,11 @@ def multigrid(matrix: sp.csr_array) -> sla.LinearOperator:
 
 
 def _multigrid(
-    matrix: sp.csr_array, right_hand_side: NDArray[np.float64], similar: sp.csr_array, tolerance: float
+    matrix: sp.csr_array,
+    right_hand_side: NDArray[np.float64],
+    similar: sp.csr_array,
+    tolerance: float,
+    tick: Tick,
 ) -> NDArray[np.float64]:
     solution, _ = sla.cg(
         matrix,
@@ -142,5 +151,6 @@ def _multigrid(
         atol=0.0,
         maxiter=_MAX_ITERATIONS,
         M=multigrid(similar),
+        callback=lambda _solution: tick(None),
     )
     return np.asarray(solution, dtype=np.float64)

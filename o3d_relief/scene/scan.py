@@ -11,6 +11,7 @@ import open3d as o3d
 from o3d_relief.errors import ParameterError
 from o3d_relief.journal import Journal, OnStage
 from o3d_relief.params import View
+from o3d_relief.progress import OnProgress
 from o3d_relief.records import StageRecord
 from o3d_relief.scan.steps import (
     ground_step,
@@ -58,6 +59,7 @@ def scan_points(
     *,
     view: View | None = None,
     on_stage: OnStage | None = None,
+    on_progress: OnProgress | None = None,
 ) -> Scan:
     """Mesh a point cloud and keep what each stage found.
 
@@ -75,6 +77,9 @@ def scan_points(
         `up` what is a ground.
     on_stage : callable, optional
         Called with each stage's record as soon as the stage is done.
+    on_progress : callable, optional
+        Called with the name of the stage and the share of it that is done, None where that is not known.
+        Where it returns False, or raises, the work ends.
 
     Returns
     -------
@@ -86,6 +91,8 @@ def scan_points(
         A cloud from which no surface can be made.
     ParameterError
         A parameter that does not fit.
+    Cancelled
+        `on_progress` returned False.
 
     Examples
     --------
@@ -99,16 +106,24 @@ def scan_points(
     for name, value, kind in (("params", params, ScanParams), ("view", view, View)):
         if not isinstance(value, kind):
             raise ParameterError(f"{name} must be a {kind.__name__}. Got {value!r} instead.")
-    journal = Journal(on_stage)
+    journal = Journal(on_stage, on_progress=on_progress)
+    journal.begin("points")
     arrays = cloud_arrays(cloud)
     points, work = points_step(arrays, params, view)
     points = journal.keep(points)
+    journal.begin("outliers")
     outlier = journal.keep(outliers_step(work, params)).outlier
+    journal.begin("normals")
     normals = journal.keep(normals_step(work, points, outlier, arrays, params))
+    journal.begin("ground")
     ground = journal.keep(ground_step(work, normals, params, view))
+    journal.begin("orientation")
     oriented = journal.keep(orientation_step(work, normals, ground, params, view))
+    journal.begin("surface")
     surface = journal.keep(surface_step(work, oriented, params))
+    journal.begin("skin")
     skin = journal.keep(skin_step(work, oriented, surface, params))
+    journal.begin("parts")
     parts = journal.keep(parts_step(points, oriented, skin, params))
     mesh = to_open3d(MeshArrays(vertices=parts.vertices, faces=parts.faces, colors=parts.colors))
     return Scan(mesh=mesh, stages=MappingProxyType(journal.stages), params=params)

@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from o3d_relief.linalg.solve import solve_spd
+from o3d_relief.progress import Tick, silent
 
 __all__ = ["Construction", "construct"]
 
@@ -45,6 +46,7 @@ def construct(
     *,
     among_held: Springs | None = None,
     to_loose: Springs | None = None,
+    tick: Tick = silent,
 ) -> Construction:
     """Find the z of all vertices from fixed points and differential coordinates.
 
@@ -74,6 +76,8 @@ def construct(
         Springs between components with fixed points.
     to_loose : quadratic form and right-hand side, optional
         Springs with an end on a loose component.
+    tick : callable, optional
+        Called in every step of the linear solver; it may raise to end the work.
 
     Returns
     -------
@@ -91,13 +95,13 @@ def construct(
     fixed[index] = True
     displacement = np.zeros(len(z))
     displacement[index] = new_height - z[index]
-    _solve_free(laplacian, among_held, held & ~fixed, displacement)
+    _solve_free(laplacian, among_held, held & ~fixed, displacement, tick)
 
     known = held
     if to_loose is not None:
         _, group = connected_components(laplacian + to_loose[0], directed=False)
         known = np.isin(group, group[held])
-        _solve_free(laplacian, to_loose, known & ~held, displacement)
+        _solve_free(laplacian, to_loose, known & ~held, displacement, tick)
     _move_loose(vertices, label, known, displacement)
 
     moved = z + displacement
@@ -111,6 +115,7 @@ def _solve_free(
     springs: Springs | None,
     free_mask: NDArray[np.bool_],
     displacement: NDArray[np.float64],
+    tick: Tick,
 ) -> None:
     """Solve for the displacement of the free vertices, in place."""
     free = np.flatnonzero(free_mask)
@@ -122,7 +127,7 @@ def _solve_free(
         right_hand_side = pull[free]
     displacement[free] = 0.0
     right_hand_side = right_hand_side - rows @ displacement
-    displacement[free] = solve_spd(rows[:, free].tocsr(), right_hand_side)
+    displacement[free] = solve_spd(rows[:, free].tocsr(), right_hand_side, tick=tick)
 
 
 def _move_loose(

@@ -9,6 +9,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from o3d_relief.linalg.solve import solve_spd
+from o3d_relief.progress import Tick, silent
 
 __all__ = ["Restoration", "restore"]
 
@@ -52,6 +53,7 @@ def restore(
     *,
     blend: float = 0.9,
     floor: NDArray[np.float64] | None = None,
+    tick: Tick = silent,
 ) -> Restoration:
     """Solve the vertices with high errors again, Appendix VI.
 
@@ -84,6 +86,8 @@ def restore(
     floor : (n,) float64, optional
         How low the vertices that are solved again may come to lie; minus infinity, or omitted, for any
         height.
+    tick : callable, optional
+        Called in every step of the linear solver; it may raise to end the work.
 
     Returns
     -------
@@ -105,7 +109,7 @@ def restore(
     solved &= has_point[label]
 
     lowest = np.where(solved, -np.inf if floor is None else floor, -np.inf)
-    system = _System(laplacian, np.flatnonzero(solved), blend)
+    system = _System(laplacian, np.flatnonzero(solved), blend, tick)
     result, on_floor, rounds = _above_floor(system, vertices[:, 2], z, lowest)
     return Restoration(
         z=result,
@@ -145,13 +149,14 @@ def _above_floor(
 class _System:
     """The rows t C + (1 - t) C D^-1 C of some vertices."""
 
-    def __init__(self, laplacian: sp.csr_array, rows: NDArray[np.int64], blend: float) -> None:
+    def __init__(self, laplacian: sp.csr_array, rows: NDArray[np.int64], blend: float, tick: Tick) -> None:
         first = laplacian[rows]
         weight_sum = laplacian.diagonal()
         inverse = np.where(weight_sum > 0.0, 1.0 / np.where(weight_sum > 0.0, weight_sum, 1.0), 0.0)
         second = first @ sp.diags_array(inverse) @ laplacian
         self._rows = rows
         self._first = first
+        self._tick = tick
         self._operator = (blend * first + (1.0 - blend) * second).tocsr()
 
     def solve(
@@ -174,6 +179,7 @@ class _System:
             operator[:, columns].tocsr(),
             -(operator @ displacement),
             similar=self._first[moving][:, columns].tocsr(),
+            tick=self._tick,
         )
         force = np.zeros(len(z))
         force[self._rows[~moving]] = self._operator[~moving] @ displacement

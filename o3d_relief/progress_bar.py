@@ -1,0 +1,71 @@
+"""How far the work is, on a terminal."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+from tqdm import tqdm
+
+__all__ = ["StageBar", "on_terminal"]
+
+_WITH_SHARE = "  {desc:<13}{percentage:3.0f}% |{bar:30}| {elapsed}"
+_WITHOUT = "  {desc:<13}  ... {elapsed}"
+
+
+def on_terminal() -> bool:
+    """Tell whether somebody watches: in a log file a bar would only be noise.
+
+    Returns
+    -------
+    bool
+    """
+    return sys.stderr is not None and sys.stderr.isatty()
+
+
+class StageBar:
+    """A bar for the stage that is under way, on a terminal only; it is gone when the stage is done.
+
+    It is given to the library as `on_progress`.
+    """
+
+    def __init__(self) -> None:
+        self._shown = on_terminal()
+        self._bar: Any = None
+        self._stage = ""
+
+    def __call__(self, stage: str, share: float | None) -> None:
+        """Show how far a stage is.
+
+        Parameters
+        ----------
+        stage : str
+        share : float or None
+            From 0 to 1; None where it is not known.
+        """
+        if not self._shown:
+            return
+        if self._bar is None or stage != self._stage:
+            self.close()
+            self._stage = stage
+            # Any step counts, and so does none: the clock goes on.
+            self._bar = tqdm(
+                total=1.0,
+                desc=stage,
+                bar_format=_WITHOUT,
+                file=sys.stderr,
+                leave=False,
+                mininterval=0.2,
+                miniters=0,
+            )
+        if share is not None:
+            self._bar.bar_format = _WITH_SHARE
+        self._bar.update(0.0 if share is None else share - self._bar.n)
+        if share == 1.0:
+            self.close()
+
+    def close(self) -> None:
+        """Take the bar away, if there is one."""
+        if self._bar is not None:
+            self._bar.close()
+            self._bar = None

@@ -1,0 +1,55 @@
+import io
+import sys
+
+from o3d_relief.progress_bar import StageBar, on_terminal
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def watched(monkeypatch):
+    """Put a terminal in place of stderr, in the test itself: pytest takes its own back after the fixtures."""
+    stream = Terminal()
+    monkeypatch.setattr(sys, "stderr", stream)
+    return stream
+
+
+def test_on_a_terminal_a_bar_comes_and_goes(monkeypatch):
+    terminal = watched(monkeypatch)
+    bar = StageBar()
+    for share in (None, 0.0, 0.5, 1.0):
+        bar("order", share)
+    text = terminal.getvalue()
+    assert "order" in text
+    assert "100%" not in text.split("\r")[-1]
+    assert text.split("\r")[-1].strip() == ""  # the line is empty again
+    assert "\n" not in text
+
+
+def test_the_share_is_drawn(monkeypatch):
+    terminal = watched(monkeypatch)
+    clock = iter(range(1000))
+    monkeypatch.setattr("tqdm.std.time", lambda: float(next(clock)))
+    bar = StageBar()
+    bar("order", None)
+    bar("order", 0.25)
+    assert " 25% |" in terminal.getvalue()
+    bar("trim", None)
+    assert "trim" in terminal.getvalue().split("\r")[-1]
+    bar.close()
+    assert terminal.getvalue().split("\r")[-1].strip() == ""
+
+
+def test_elsewhere_there_is_none(monkeypatch):
+    stream = io.StringIO()
+    monkeypatch.setattr(sys, "stderr", stream)
+    bar = StageBar()
+    bar("order", 0.5)
+    bar.close()
+    assert stream.getvalue() == ""
+    assert not on_terminal()
+    monkeypatch.setattr(sys, "stderr", None)  # closed when the program was started
+    StageBar()("order", 0.5)
+    assert not on_terminal()
