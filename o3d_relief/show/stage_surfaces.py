@@ -40,6 +40,8 @@ class CutRelief:
     normals : (c, 3) float64
     welded : (c,) int64
         The welded vertex that each vertex is, or lies nearest to on the edge that was cut.
+    made : (c,) bool
+        Whether the cut has made it.
     colors : (c, 3) float64 or None
         sRGB in [0, 1].
     """
@@ -48,6 +50,7 @@ class CutRelief:
     faces: NDArray[np.int64]
     normals: NDArray[np.float64]
     welded: NDArray[np.int64]
+    made: NDArray[np.bool_]
     colors: NDArray[np.float64] | None
 
     @classmethod
@@ -63,6 +66,7 @@ class CutRelief:
             faces=np.array(relief.mesh.triangles, dtype=np.int64),
             normals=np.array(relief.mesh.vertex_normals),
             welded=scene.welded_index[nearest],
+            made=relief.source_index < 0,
             colors=vertex_colors(relief.mesh),
         )
 

@@ -64,7 +64,6 @@ class StageViewer:
         if not isinstance(view, View):
             raise ParameterError(f"view must be a View. Got {view!r} instead.")
         require_display()
-        colors = None if mesh is None else vertex_colors(mesh)
         home = str(Path(__file__).parents[2])
         search = os.pathsep.join(filter(None, [home, os.environ.get("PYTHONPATH", "")]))
         self._process = subprocess.Popen(
@@ -72,6 +71,7 @@ class StageViewer:
             stdin=subprocess.PIPE,
             env={**os.environ, "PYTHONPATH": search},
         )
+        colors = None if mesh is None else vertex_colors(mesh)  # while the process wakes up
         self._send(Opening(viewpoint=view.viewpoint, colors=colors, title=title, size=size))
 
     def __call__(self, record: StageRecord) -> None:

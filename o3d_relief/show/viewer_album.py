@@ -115,6 +115,7 @@ class Album:
             colors[scene.welded_index[used]] = self._colors[used]
             return colors
         if cut is not None and cut.colors is not None:
-            colors[cut.welded] = cut.colors
+            for some in (cut.made, ~cut.made):  # a vertex's own colour counts, where it is still there
+                colors[cut.welded[some]] = cut.colors[some]
             return colors
         return None

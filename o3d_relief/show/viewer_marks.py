@@ -17,7 +17,7 @@ Legend = tuple[tuple[tuple[float, float, float], str], ...]
 
 _BALL = 0.9  # relief units
 _MANY_EDGES = 30_000
-_CELLS = 70
+_CELLS = 60
 """A scene of more edges is drawn over a grid of so many cells along its longest side."""
 _PAPER = 250
 

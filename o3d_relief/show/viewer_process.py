@@ -33,12 +33,11 @@ def main() -> int:
     messages: queue.SimpleQueue[Any] = queue.SimpleQueue()
     # At once, so that the sender never waits for Open3D to be imported.
     threading.Thread(target=_receive, args=(sys.stdin.buffer, messages), daemon=True).start()
+    from o3d_relief.show.viewer_window import ViewerWindow
+
     opening = messages.get()
     if not isinstance(opening, Opening):
         return 0
-
-    from o3d_relief.show.viewer_window import ViewerWindow
-
     try:
         window = ViewerWindow(
             tell, viewpoint=opening.viewpoint, colors=opening.colors, title=opening.title, size=opening.size
