@@ -6,6 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from o3d_relief.editor import ReliefEditor
     from o3d_relief.errors import (
         Cancelled,
         DisplayError,
@@ -54,6 +55,7 @@ __all__ = [
     "PlateParams",
     "PointEdit",
     "Relief",
+    "ReliefEditor",
     "ReliefError",
     "ReliefParams",
     "ReliefQuality",
@@ -103,6 +105,7 @@ _HOME = {
     "SolverError": "errors",
     "ReliefParams": "params",
     "View": "params",
+    "ReliefEditor": "editor",
     "PointEdit": "point_edits",
     "load_params": "params_file",
     "save_params": "params_file",

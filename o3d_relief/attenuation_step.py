@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from o3d_relief.errors import ParameterError
 from o3d_relief.params import ReliefParams
+from o3d_relief.point_edits import PointEdit
 from o3d_relief.records import AttenuationStage, ClustersStage, SceneStage
 from o3d_relief.stages.attenuation import (
     actions,
@@ -19,7 +21,14 @@ from o3d_relief.stages.attenuation import (
     select_points,
 )
 
-__all__ = ["ChosenPoints", "attenuation_step", "beta_of_clusters", "chosen_points", "settled_points"]
+__all__ = [
+    "ChosenPoints",
+    "attenuation_step",
+    "beta_of_clusters",
+    "chosen_points",
+    "edited_points",
+    "settled_points",
+]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,7 +73,7 @@ def settled_points(
     """Decide what becomes of each point, and find their new heights."""
     action = actions(chosen.rho, discard_above=params.discard_above, attach_below=params.attach_below)
     beta = _beta_of_points(params, chosen.cluster)
-    point = _edited_points(scene, clusters, chosen, params)
+    point = edited_points(scene, clusters, chosen, params.point_edits)
     released = np.zeros(len(action), dtype=bool)
     for edit, i in zip(params.point_edits, point, strict=True):
         if i >= 0 and edit.beta is not None:
@@ -98,11 +107,11 @@ def settled_points(
     )
 
 
-def _edited_points(
-    scene: SceneStage, clusters: ClustersStage, chosen: ChosenPoints, params: ReliefParams
+def edited_points(
+    scene: SceneStage, clusters: ClustersStage, chosen: ChosenPoints, edits: Sequence[PointEdit]
 ) -> NDArray[np.int64]:
     """Return the point that each edit concerns, -1 where no vertex of its cluster is visible."""
-    vertex = np.array([edit.vertex for edit in params.point_edits], dtype=np.int64)
+    vertex = np.array([edit.vertex for edit in edits], dtype=np.int64)
     count = len(scene.welded_index)
     for wrong in vertex[vertex >= count]:
         raise ParameterError(f"An edit's vertex must be one of the mesh's {count}. Got {wrong} instead.")

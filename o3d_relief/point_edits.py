@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from o3d_relief.errors import ParameterError
 from o3d_relief.param_checks import check_integer, check_range
 
-__all__ = ["ACTIONS", "PointEdit", "check_edits"]
+__all__ = ["ACTIONS", "PointEdit", "check_edits", "merged"]
 
 ACTIONS = ("attach", "scale", "discard")
 
@@ -77,3 +78,25 @@ def check_edits(values: Any) -> tuple[PointEdit, ...]:
     if not all(isinstance(item, PointEdit) for item in items):
         raise ParameterError(f"point_edits must be a sequence of PointEdit. Got {values!r} instead.")
     return items
+
+
+def merged(vertex: int, edits: Sequence[PointEdit]) -> PointEdit:
+    """Make one edit of several of one point.
+
+    Parameters
+    ----------
+    vertex : int
+        Of the result.
+    edits : sequence of PointEdit
+        At least one; the last action that is given counts, and the last beta.
+
+    Examples
+    --------
+    >>> merged(7, [PointEdit(vertex=5, beta=0.1), PointEdit(vertex=7, action="attach")])
+    PointEdit(vertex=7, action='attach', beta=0.1)
+    """
+    action = beta = None
+    for edit in edits:
+        action = action if edit.action is None else edit.action
+        beta = beta if edit.beta is None else edit.beta
+    return PointEdit(vertex=vertex, action=action, beta=beta)

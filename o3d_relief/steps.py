@@ -76,11 +76,8 @@ def scene_step(
     welded = weld(to_relief_units(in_vertices, frame, on_grid=True), in_faces)
     if len(welded.faces) == 0:
         raise MeshError(f"None of the {len(in_faces)} triangles of the mesh has three different corners.")
-    if not params.bounded and params.k > len(welded.vertices):
-        raise ParameterError(
-            f"k must be at most the number of vertices, {len(welded.vertices)} after welding. "
-            f"Got {params.k} instead: give a smaller k."
-        )
+    if not params.bounded:
+        check_k(params, len(welded.vertices))
     return SceneStage(
         vertices=welded.vertices,
         faces=welded.faces,
@@ -98,6 +95,15 @@ def scene_step(
             "duplicate_faces": welded.duplicate_faces,
         },
     )
+
+
+def check_k(params: ReliefParams, vertices: int) -> None:
+    """Check that there are enough vertices for the clusters."""
+    if params.k > vertices:
+        raise ParameterError(
+            f"k must be at most the number of vertices, {vertices} after welding. "
+            f"Got {params.k} instead: give a smaller k."
+        )
 
 
 def perspective_step(vertices: NDArray[np.float64], view: View) -> PerspectiveStage:

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from o3d_relief.bounds.pairs import Pairs, touching_pairs
 
-__all__ = ["Ties", "tie_parts"]
+__all__ = ["PartSprings", "Ties", "find_springs", "tie_parts"]
 
 _ACROSS_GAPS = 0.1
 """Stiffness of a spring across a gap, against cotangent weights of about 1."""
@@ -56,6 +56,122 @@ class Ties:
     to_nearest: int
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PartSprings:
+    """All springs between the parts of a mesh, whichever of them hold a fixed point.
+
+    Attributes
+    ----------
+    rows : (s, n) sparse float64
+        The difference of heights that each spring answers to.
+    stiffness : (s,) float64
+    ends : (s, 2) int64
+        A vertex of each of the two parts.
+    stacked : Pairs
+        What the springs across gaps, which come first, hold apart.
+    in_contact, to_nearest : int
+        Number of springs of the other two kinds.
+    """
+
+    rows: sp.csr_array
+    stiffness: NDArray[np.float64]
+    ends: NDArray[np.int64]
+    stacked: Pairs
+    in_contact: int
+    to_nearest: int
+
+    def loose(self, held: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Find the springs (s,) with an end on a part without a fixed point; `held` (n,) are the others."""
+        return np.asarray(~held[self.ends].all(axis=1))
+
+    def change(self, shrink: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return by how much each spring is longer at rest, (s,), for the gaps (len(stacked),) at rest."""
+        change = np.zeros(len(self.stiffness))
+        change[: len(self.stacked)] = shrink - self.stacked.gap
+        return change
+
+    def system(self, chosen: NDArray[np.bool_]) -> tuple[sp.csr_array, sp.csr_array]:
+        """Return the quadratic form (n, n) of some springs, and what their changes pull with, (n, s')."""
+        weighted = self.rows[chosen].T @ sp.diags_array(self.stiffness[chosen])
+        return (weighted @ self.rows[chosen]).tocsr(), weighted.tocsr()
+
+    def ties(self, held: NDArray[np.bool_], shrink: NDArray[np.float64]) -> Ties:
+        """Sort the springs by whether both their parts hold a fixed point.
+
+        Parameters
+        ----------
+        held : (n,) bool
+            The vertices of parts that hold a fixed point.
+        shrink : (len(stacked),) float64
+            The gap of each stacked pair if empty space were attenuated like a differential.
+
+        Returns
+        -------
+        Ties
+        """
+        loose, change = self.loose(held), self.change(shrink)
+        among_held, held_pull = self.system(~loose)
+        to_loose, loose_pull = self.system(loose)
+        return Ties(
+            among_held=among_held,
+            among_held_pull=held_pull @ change[~loose],
+            to_loose=to_loose,
+            to_loose_pull=loose_pull @ change[loose],
+            across_gaps=len(self.stacked),
+            in_contact=self.in_contact,
+            to_nearest=self.to_nearest,
+        )
+
+
+def find_springs(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    laplacian: sp.csr_array,
+    pairs: Pairs,
+    *,
+    across_gaps: float = _ACROSS_GAPS,
+) -> PartSprings | None:
+    """Find the springs that tie the connected components of a mesh to each other.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+        In the relief frame, in relief units.
+    faces : (m, 3) int64
+    laplacian : (n, n) sparse float64
+        The cotangent Laplacian, whose graph tells the components.
+    pairs : Pairs
+        What is stacked on vertical lines, of one component or of two.
+    across_gaps : float
+        Stiffness of a spring across a gap, against cotangent weights of about 1.
+
+    Returns
+    -------
+    PartSprings or None
+        None for a mesh of one component.
+    """
+    count, label = connected_components(laplacian, directed=False)
+    if count == 1:
+        return None
+    n = len(vertices)
+    apart = pairs.select(label[pairs.upper[:, 0]] != label[pairs.lower[:, 0]])
+    touching = touching_pairs(vertices, faces, label, _TOUCH)
+    everything = laplacian + apart.difference(n).T @ apart.difference(n)
+    everything = everything + touching.difference(n).T @ touching.difference(n)
+    strays = _nearest_outside(vertices, *connected_components(everything, directed=False))
+    ends = [np.stack([some.upper[:, 0], some.lower[:, 0]], axis=1) for some in (apart, touching)]
+    return PartSprings(
+        rows=sp.vstack([apart.difference(n), touching.difference(n), _edge_rows(strays, n)]).tocsr(),
+        stiffness=np.repeat(
+            [across_gaps, _IN_CONTACT, _IN_CONTACT], [len(apart), len(touching), len(strays)]
+        ),
+        ends=np.concatenate([*ends, strays]),
+        stacked=apart,
+        in_contact=len(touching),
+        to_nearest=len(strays),
+    )
+
+
 def tie_parts(
     vertices: NDArray[np.float64],
     faces: NDArray[np.int64],
@@ -66,65 +182,31 @@ def tie_parts(
     *,
     across_gaps: float = _ACROSS_GAPS,
 ) -> Ties | None:
-    """Tie the connected components of a mesh to each other.
+    """Tie the connected components of a mesh to each other, by the springs of `find_springs`.
 
     Parameters
     ----------
     vertices : (n, 3) float64
-        In the relief frame, in relief units.
     faces : (m, 3) int64
     laplacian : (n, n) sparse float64
-        The cotangent Laplacian, whose graph tells the components.
     index : (q,) int64
         The fixed points; a component without one is loose.
     pairs : Pairs
-        What is stacked on vertical lines, of one component or of two.
     shrink : (p,) float64
         The gap that each pair would have if empty space were attenuated like a differential.
     across_gaps : float
-        Stiffness of a spring across a gap, against cotangent weights of about 1.
 
     Returns
     -------
     Ties or None
         None for a mesh of one component.
     """
-    count, label = connected_components(laplacian, directed=False)
-    if count == 1:
+    springs = find_springs(vertices, faces, laplacian, pairs, across_gaps=across_gaps)
+    if springs is None:
         return None
-    n = len(vertices)
+    _, label = connected_components(laplacian, directed=False)
     across = label[pairs.upper[:, 0]] != label[pairs.lower[:, 0]]
-    apart = pairs.select(across)
-    touching = touching_pairs(vertices, faces, label, _TOUCH)
-    everything = laplacian + apart.difference(n).T @ apart.difference(n)
-    everything = everything + touching.difference(n).T @ touching.difference(n)
-    strays = _nearest_outside(vertices, *connected_components(everything, directed=False))
-
-    held = np.isin(label, label[index])
-    rows = sp.vstack([apart.difference(n), touching.difference(n), _edge_rows(strays, n)]).tocsr()
-    stiffness = np.repeat([across_gaps, _IN_CONTACT, _IN_CONTACT], [len(apart), len(touching), len(strays)])
-    change = np.concatenate([shrink[across] - apart.gap, np.zeros(len(touching) + len(strays))])
-    loose = np.concatenate(
-        [
-            ~(held[apart.upper[:, 0]] & held[apart.lower[:, 0]]),
-            ~(held[touching.upper[:, 0]] & held[touching.lower[:, 0]]),
-            ~held[strays].all(axis=1),
-        ]
-    )
-    form, pull = [], []
-    for chosen in (~loose, loose):
-        weighted = rows[chosen].T @ sp.diags_array(stiffness[chosen])
-        form.append((weighted @ rows[chosen]).tocsr())
-        pull.append(np.asarray(weighted @ change[chosen]))
-    return Ties(
-        among_held=form[0],
-        among_held_pull=pull[0],
-        to_loose=form[1],
-        to_loose_pull=pull[1],
-        across_gaps=len(apart),
-        in_contact=len(touching),
-        to_nearest=len(strays),
-    )
+    return springs.ties(np.isin(label, label[index]), shrink[across])
 
 
 def _nearest_outside(

@@ -107,7 +107,8 @@ def solve_direct(matrix: sp.csr_array, right_hand_side: NDArray[np.float64]) -> 
 
 
 def _with_small_indices(matrix: sp.csr_array) -> sp.csr_matrix:
-    """Return a matrix with 32-bit indices: older versions of pyamg know no others."""
+    """Return a matrix with 32-bit indices, sorted: pyamg goes wrong with others, in silence."""
+    matrix = matrix if matrix.has_sorted_indices else matrix.sorted_indices()
     parts = matrix.data, matrix.indices.astype(np.int32), matrix.indptr.astype(np.int32)
     return sp.csr_matrix(parts, shape=matrix.shape)
 

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from o3d_relief.linalg.solve import solve_spd
 from o3d_relief.progress import Tick, silent
 
-__all__ = ["Construction", "construct"]
+__all__ = ["Construction", "construct", "leaders"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -137,12 +137,34 @@ def _move_loose(
     displacement: NDArray[np.float64],
 ) -> None:
     """Give each loose component, in place, the displacement of the controlled vertex nearest to it."""
+    leader = leaders(vertices, label, controlled)
+    displacement[~controlled] = displacement[leader]
+
+
+def leaders(
+    vertices: NDArray[np.float64], label: NDArray[np.int32], controlled: NDArray[np.bool_]
+) -> NDArray[np.int64]:
+    """Find the vertex that each vertex of a loose component follows.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+    label : (n,) int
+        Connected component of each vertex.
+    controlled : (n,) bool
+        The vertices of components that are not loose.
+
+    Returns
+    -------
+    (l,) int64
+        For each vertex that is not controlled the controlled one that is nearest to its component.
+    """
     loose = np.flatnonzero(~controlled)
     if len(loose) == 0:
-        return
+        return loose
     candidates = np.flatnonzero(controlled)
     distance, nearest = cKDTree(vertices[candidates]).query(vertices[loose])
     order = np.lexsort((distance, label[loose]))
     components, first = np.unique(label[loose][order], return_index=True)
     leader = candidates[nearest[order[first]]]
-    displacement[loose] = displacement[leader][np.searchsorted(components, label[loose])]
+    return np.asarray(leader[np.searchsorted(components, label[loose])], dtype=np.int64)

@@ -30,6 +30,15 @@ def test_both_ways_agree():
     assert found == pytest.approx(np.tile(half, 2), abs=1e-6 * np.abs(half).max())
 
 
+def test_the_order_of_the_entries_does_not_matter():
+    matrix, right = _system(90)
+    shuffled = (matrix.T @ sp.eye_array(matrix.shape[0], format="csr")[::-1]).tocsr()[:, ::-1].tocsr()
+    shuffled.has_sorted_indices = None
+    assert not shuffled.has_sorted_indices
+    found = solve_spd(matrix, right)
+    assert solve_spd(shuffled, right) == pytest.approx(found, abs=1e-9 * np.abs(found).max())
+
+
 def test_same_bytes_whatever_the_number_of_threads():
     matrix, right = _system(90)
     once = solve_spd(matrix, right)
