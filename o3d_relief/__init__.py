@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from o3d_relief.scene.write import write_mesh
     from o3d_relief.show.camera import view_direction
     from o3d_relief.show.comparison import comparison_sheet
+    from o3d_relief.show.edit import edit
     from o3d_relief.show.render import render, save_png
     from o3d_relief.show.sheets import contact_sheet
     from o3d_relief.show.viewer import StageViewer, show_stages
@@ -73,6 +74,7 @@ __all__ = [
     "contact_sheet",
     "cotangent_laplacian",
     "demo_scene",
+    "edit",
     "height_field",
     "load_params",
     "make_relief",
@@ -142,6 +144,7 @@ _HOME = {
     "save_png": "show.render",
     "view_direction": "show.camera",
     "StageViewer": "show.viewer",
+    "edit": "show.edit",
     "show_stages": "show.viewer",
 }
 

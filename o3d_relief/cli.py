@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 from o3d_relief.arguments import parse
 from o3d_relief.console import make_folder, tell, tell_result, tell_stage, write_report, write_stages
+from o3d_relief.edit_command import edit
 from o3d_relief.errors import ReliefError
 from o3d_relief.make_command import make
 from o3d_relief.params import ReliefParams
@@ -42,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         options = parse(given)
-        return {"make": make, "demo": _demo, "view": view}[options.command](options)
+        return {"make": make, "demo": _demo, "view": view, "edit": edit}[options.command](options)
     except ReliefError as error:
         tell(f"o3d-relief: error: {error}")
         return 2

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from o3d_relief.errors import DisplayError
 
-__all__ = ["require_display"]
+__all__ = ["require_display", "require_vulkan"]
 
 _OTHER_WAY = "o3d-relief make INPUT OUTPUT --stages DIR draws every stage without one"
 
@@ -37,6 +37,42 @@ def require_display() -> None:
     named = [f"{name}={value}" for name, value in names.items() if value]
     what = f"the display {' and '.join(named)} does not answer" if named else "there is no display"
     raise DisplayError(f"No window can be opened, {what}: {_OTHER_WAY}.")
+
+
+def require_vulkan() -> None:
+    """Check that there is a Vulkan driver, which Open3D's gui draws with on Linux: it aborts without one.
+
+    Raises
+    ------
+    DisplayError
+        There is none.
+    """
+    if sys.platform in ("darwin", "win32"):
+        return
+    if not _vulkan_starts():
+        raise DisplayError(
+            "The editor's window needs a Vulkan driver: install that of the graphics card or, to draw without "
+            "one, Debian's libvulkan1 and chromium-common with "
+            "VK_ICD_FILENAMES=/usr/lib/chromium/vk_swiftshader_icd.json."
+        )
+
+
+def _vulkan_starts() -> bool:
+    try:
+        vulkan = ctypes.CDLL("libvulkan.so.1")
+    except OSError:
+        return False
+    # VkInstanceCreateInfo: its type, 1, and nothing else.
+    wanted = (ctypes.c_uint64 * 8)(1, 0, 0, 0, 0, 0, 0, 0)
+    instance = ctypes.c_void_p()
+    if vulkan.vkCreateInstance(ctypes.byref(wanted), None, ctypes.byref(instance)) != 0:
+        return False
+    count = ctypes.c_uint32()
+    vulkan.vkEnumeratePhysicalDevices.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p]
+    found = vulkan.vkEnumeratePhysicalDevices(instance, ctypes.byref(count), None)
+    vulkan.vkDestroyInstance.argtypes = [ctypes.c_void_p, ctypes.c_void_p]
+    vulkan.vkDestroyInstance(instance, None)
+    return bool(found == 0 and count.value > 0)
 
 
 def _x_answers() -> bool:

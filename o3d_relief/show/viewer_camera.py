@@ -29,7 +29,6 @@ def look_from(window: Any, viewpoint: Triple | None, bounds: NDArray[np.float64]
     control = window.get_view_control()
     middle = bounds.mean(axis=0)
     if viewpoint is None:
-        window.reset_view_point(True)
         control.change_field_of_view(_FAR_DEGREES - control.get_field_of_view())
         control.set_front([0.0, 0.0, 1.0])
         control.set_up([0.0, 1.0, 0.0])

@@ -172,6 +172,7 @@ class ViewerWindow:
         self._put("surface", self._live.mesh)
         self._put("plane", plane_outline(bounds))
         self._put("caption", self._caption.mesh)
+        self._window.reset_view_point(True)
         self._look()
 
     def _draw(self) -> None:

@@ -19,9 +19,9 @@ with rel.StageViewer(mesh, rel.View(viewpoint=(0, 0, 400)), size=(500, 400)) as 
     relief = rel.make_relief(mesh, rel.ReliefParams(k=8, depth=20, mode="attenuation"), on_stage=viewer)
     viewer.finish(relief)
     viewer.wait()
-print("went on", len(relief.stages))
+print("went on", len(relief.stages), flush=True)
 rel.show_stages(relief)
-print("shown again")
+print("shown again", flush=True)
 viewer(relief.stages["scene"])  # nobody is there any more
 """
 
