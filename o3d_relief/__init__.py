@@ -8,9 +8,16 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from o3d_relief.batch import Batch, make_reliefs
     from o3d_relief.batch_manifest import BatchEntry
-    from o3d_relief.errors import Cancelled, FileError, MeshError, ParameterError, ReliefError, SolverError
     from o3d_relief.editor import ReliefEditor
-    from o3d_relief.errors import FileError, MeshError, ParameterError, ReliefError, SolverError
+    from o3d_relief.errors import (
+        Cancelled,
+        DisplayError,
+        FileError,
+        MeshError,
+        ParameterError,
+        ReliefError,
+        SolverError,
+    )
     from o3d_relief.linalg.laplacian import cotangent_laplacian
     from o3d_relief.measure import ReliefQuality, Yardstick, measure_relief
     from o3d_relief.params import ReliefParams, View
@@ -25,8 +32,10 @@ if TYPE_CHECKING:
     from o3d_relief.scene.write import write_mesh
     from o3d_relief.show.camera import view_direction
     from o3d_relief.show.comparison import comparison_sheet
+    from o3d_relief.show.edit import edit
     from o3d_relief.show.render import render, save_png
     from o3d_relief.show.sheets import contact_sheet
+    from o3d_relief.show.viewer import StageViewer, show_stages
     from o3d_relief.solid.body import Solid
     from o3d_relief.solid.checks import SolidReport, check_solid
     from o3d_relief.solid.formats import write_solid
@@ -43,6 +52,7 @@ __all__ = [
     "Batch",
     "BatchEntry",
     "Cancelled",
+    "DisplayError",
     "FileError",
     "MeshError",
     "MillParams",
@@ -59,6 +69,7 @@ __all__ = [
     "Solid",
     "SolidReport",
     "SolverError",
+    "StageViewer",
     "TileParams",
     "View",
     "Yardstick",
@@ -67,6 +78,7 @@ __all__ = [
     "contact_sheet",
     "cotangent_laplacian",
     "demo_scene",
+    "edit",
     "height_field",
     "load_params",
     "make_relief",
@@ -82,6 +94,7 @@ __all__ = [
     "save_params",
     "save_png",
     "scan_points",
+    "show_stages",
     "solid_under",
     "view_direction",
     "write_height_map",
@@ -94,6 +107,7 @@ _HOME = {
     "BatchEntry": "batch_manifest",
     "make_reliefs": "batch",
     "Cancelled": "errors",
+    "DisplayError": "errors",
     "FileError": "errors",
     "MeshError": "errors",
     "ParameterError": "errors",
@@ -137,6 +151,9 @@ _HOME = {
     "render": "show.render",
     "save_png": "show.render",
     "view_direction": "show.camera",
+    "StageViewer": "show.viewer",
+    "edit": "show.edit",
+    "show_stages": "show.viewer",
 }
 
 

@@ -17,6 +17,7 @@ from o3d_relief.params import ReliefParams, View
 from o3d_relief.params_file import field_values, load_params
 from o3d_relief.plate_params import HANGINGS, LOOSE, PRINT_DIRECTIONS, SHAPES, PlateParams
 from o3d_relief.scan_arguments import add_scan
+from o3d_relief.window_arguments import add_windows
 from o3d_relief.workshop_arguments import add_workshop, wants_workshop
 
 __all__ = ["chosen_params", "chosen_plate", "chosen_view", "parse"]
@@ -121,7 +122,7 @@ def _beta(text: str) -> float | tuple[float, ...]:
 
 
 def _parser(replaced: dict[str, Any]) -> argparse.ArgumentParser:
-    """Build the parser; `replaced` holds values in place of the defaults of "make" and "batch"."""
+    """Build the parser; `replaced` holds values in place of the defaults of the commands."""
     parser = _Parser(prog="o3d-relief", description="Make high reliefs from 3D scenes.", allow_abbrev=False)
     parser.add_argument("--version", action="version", version=f"o3d-relief {__version__}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND", dest="command")
@@ -151,9 +152,7 @@ def _parser(replaced: dict[str, Any]) -> argparse.ArgumentParser:
         "--dry-run", action="store_true", help="only tell sizes, volume, triangles and memory in advance"
     )
 
-    make.add_argument(
-        "--max-triangles", type=int, metavar="N", help=f"refuse larger meshes (default: {MAX_TRIANGLES})"
-    )
+    _add_limit(make)
     make.set_defaults(**replaced)
 
     many = commands.add_parser(
@@ -167,6 +166,9 @@ def _parser(replaced: dict[str, Any]) -> argparse.ArgumentParser:
     _add_params(many)
     add_scan(many, _point)
     many.set_defaults(**replaced)
+
+    shared = [_add_view, _add_params, lambda command: add_scan(command, _point), _add_limit]
+    add_windows(commands, _FORMATS, shared, replaced)
 
     demo = commands.add_parser(
         "demo",
@@ -182,6 +184,12 @@ def _parser(replaced: dict[str, Any]) -> argparse.ArgumentParser:
         help="default: %(default)s",
     )
     return parser
+
+
+def _add_limit(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--max-triangles", type=int, metavar="N", help=f"refuse larger meshes (default: {MAX_TRIANGLES})"
+    )
 
 
 def _add_view(command: argparse.ArgumentParser) -> None:

@@ -11,9 +11,11 @@ from collections.abc import Sequence
 from o3d_relief.arguments import parse
 from o3d_relief.batch_command import batch
 from o3d_relief.console import make_folder, tell, tell_result, tell_stage, write_report, write_stages
+from o3d_relief.edit_command import edit
 from o3d_relief.errors import ReliefError
 from o3d_relief.make_command import make
 from o3d_relief.params import ReliefParams
+from o3d_relief.view_command import view
 
 __all__ = ["main"]
 
@@ -43,7 +45,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         options = parse(given)
-        return {"make": make, "batch": batch, "demo": _demo}[options.command](options)
+        commands = {"make": make, "batch": batch, "demo": _demo, "view": view, "edit": edit}
+        return commands[options.command](options)
     except ReliefError as error:
         tell(f"o3d-relief: error: {error}")
         return 2

@@ -18,6 +18,7 @@ from o3d_relief.params import ReliefParams, View
 from o3d_relief.params_file import load_params, save_params
 from o3d_relief.pipeline import Relief, make_relief
 from o3d_relief.point_edits import PointEdit, merged
+from o3d_relief.progress import OnProgress
 from o3d_relief.records import AttenuationStage
 
 __all__ = ["EditorPoints", "ReliefEditor"]
@@ -330,17 +331,21 @@ class ReliefEditor:
         """Take parameters, view and edits from a file, see `load_params`; `undo` takes that back."""
         self._go(*load_params(path))
 
-    def relief(self, *, on_stage: OnStage | None = None) -> Relief:
+    def relief(self, *, on_stage: OnStage | None = None, on_progress: OnProgress | None = None) -> Relief:
         """Make the relief, with everything that the preview leaves out.
 
         Parameters
         ----------
         on_stage : callable, optional
             Called with each stage's record as soon as the stage is done.
+        on_progress : callable, optional
+            Told how far the stages are; may call the work off, see `make_relief`.
 
         Returns
         -------
         Relief
             The same as ``make_relief(mesh, editor.params, view=editor.view)``.
         """
-        return make_relief(self._mesh, self._params, view=self.view, on_stage=on_stage)
+        return make_relief(
+            self._mesh, self._params, view=self.view, on_stage=on_stage, on_progress=on_progress
+        )

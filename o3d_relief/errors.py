@@ -1,6 +1,14 @@
 """The errors that this package raises: one clear sentence each."""
 
-__all__ = ["Cancelled", "FileError", "MeshError", "ParameterError", "ReliefError", "SolverError"]
+__all__ = [
+    "Cancelled",
+    "DisplayError",
+    "FileError",
+    "MeshError",
+    "ParameterError",
+    "ReliefError",
+    "SolverError",
+]
 
 
 class ReliefError(Exception):
@@ -25,3 +33,7 @@ class Cancelled(ReliefError):  # noqa: N818, it is no error of anybody
 
 class SolverError(ReliefError, RuntimeError):
     """A linear system that could not be solved to the accuracy asked for."""
+
+
+class DisplayError(ReliefError, RuntimeError):
+    """A window that cannot be opened here."""

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from o3d_relief.making import Made
     from o3d_relief.pipeline import Relief
 
-__all__ = ["make"]
+__all__ = ["make", "read_scene"]
 
 
 def make(options: argparse.Namespace) -> int:
@@ -58,7 +58,7 @@ def make(options: argparse.Namespace) -> int:
 
     _check_endings(options, solid=plate is not None)
     started = time.perf_counter()
-    scene, meshing = _read(options.input, scan)
+    scene, meshing = read_scene(options.input, scan)
     if meshing is None and plate is None:
         for note in lost_attributes(options.output, scene):
             tell(note)
@@ -117,8 +117,26 @@ def _write(options: argparse.Namespace, relief: Relief, made: Made | None, taken
         write_stages(options.stages, relief)
 
 
-def _read(path: Path, scan: ScanParams) -> tuple[TriangleMesh | PointCloud, ScanParams | None]:
-    """Read the scene and say what it is; return it and, for a point cloud, how to mesh it."""
+def read_scene(path: Path, scan: ScanParams) -> tuple[TriangleMesh | PointCloud, ScanParams | None]:
+    """Read a scene and say what it is.
+
+    Parameters
+    ----------
+    path : Path
+    scan : ScanParams
+        How a point cloud is to be meshed.
+
+    Returns
+    -------
+    scene : open3d.geometry.TriangleMesh or open3d.geometry.PointCloud
+    scan : ScanParams or None
+        For a point cloud, with what its file says of the scanner.
+
+    Raises
+    ------
+    ReliefError
+        Anything that the user can mend.
+    """
     from o3d_relief.scene.arrays import MeshArrays, to_open3d
     from o3d_relief.scene.read import left_out, read_arrays
 

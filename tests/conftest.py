@@ -1,9 +1,12 @@
 """Fixtures that several test modules share."""
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+from screen import Screen, missing
 
 
 @pytest.fixture(scope="session")
@@ -16,3 +19,13 @@ def data_folder() -> Path:
     if not folder.is_dir():
         pytest.skip(f"the folder of O3D_RELIEF_DATA, {name}, is missing")
     return folder
+
+
+@pytest.fixture(scope="session")
+def screen(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Screen]:
+    """Start a screen for real windows."""
+    if missing():
+        pytest.skip(f"there is no screen: install Debian's packages {' '.join(missing())}")
+    screen = Screen(tmp_path_factory.mktemp("screen"))
+    yield screen
+    screen.close()

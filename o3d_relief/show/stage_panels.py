@@ -32,7 +32,7 @@ from o3d_relief.show.render import render
 if TYPE_CHECKING:
     import open3d as o3d
 
-__all__ = ["OBLIQUE", "PANELS", "Easel", "Pictures"]
+__all__ = ["ACTIONS", "HIDDEN", "OBLIQUE", "PANELS", "SEEN", "Easel", "Pictures"]
 
 Pictures = list[NDArray[np.uint8]]
 Vector = tuple[float, float, float]
@@ -44,8 +44,8 @@ OBLIQUE = view_direction(38.0, 12.0)
 _NEAR_FRONT = view_direction(22.0, 10.0)
 _SIDE = view_direction(65.0, 8.0)
 _GAP = 4  # pixels
-_SEEN, _HIDDEN = (0.93, 0.78, 0.42), (0.33, 0.45, 0.62)
-_ACTIONS = {"attach": (0.16, 0.47, 0.71), "scale": (0.93, 0.66, 0.16), "discard": (0.78, 0.17, 0.20)}
+SEEN, HIDDEN = (0.93, 0.78, 0.42), (0.33, 0.45, 0.62)
+ACTIONS = {"attach": (0.16, 0.47, 0.71), "scale": (0.93, 0.66, 0.16), "discard": (0.78, 0.17, 0.20)}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -130,9 +130,9 @@ def _perspective(easel: Easel) -> Pictures:
 
 def _visibility(easel: Easel) -> Pictures:
     visible = easel.record(VisibilityStage).visible
-    colors = np.where(visible[:, None], _SEEN, _HIDDEN)
+    colors = np.where(visible[:, None], SEEN, HIDDEN)
     count = int(visible.sum())
-    legend = [(_SEEN, f"visible: {count}"), (_HIDDEN, f"hidden: {len(visible) - count}")]
+    legend = [(SEEN, f"visible: {count}"), (HIDDEN, f"hidden: {len(visible) - count}")]
     mesh = easel.mesh(easel.vertices)
     return [
         render(mesh, size=easel.size, colors=colors, sharp_colors=True, title="visibility", legend=legend),
@@ -179,9 +179,9 @@ def _attenuation(easel: Easel) -> Pictures:
     record = easel.record(AttenuationStage)
     mesh = easel.mesh(easel.vertices)
     points = easel.vertices[record.index]
-    colors = np.array([_ACTIONS[str(action)] for action in record.action]).reshape(-1, 3)
+    colors = np.array([ACTIONS[str(action)] for action in record.action]).reshape(-1, 3)
     legend: list[tuple[ArrayLike, str]] = [
-        (color, f"{action}: {int(np.sum(record.action == action))}") for action, color in _ACTIONS.items()
+        (color, f"{action}: {int(np.sum(record.action == action))}") for action, color in ACTIONS.items()
     ]
     radius = _dot(easel, len(points))
     kept = record.action != "discard"

@@ -1,0 +1,67 @@
+"""The viewer as a callback of a script, its window in a process of its own."""
+
+import os
+import sys
+
+import pytest
+
+from o3d_relief.errors import DisplayError, ParameterError
+from o3d_relief.show.viewer import StageViewer
+from screen import Program
+
+SCRIPT = """
+import sys
+import open3d as o3d
+import o3d_relief as rel
+
+mesh = o3d.io.read_triangle_mesh(sys.argv[1])
+with rel.StageViewer(mesh, rel.View(viewpoint=(0, 0, 400)), size=(500, 400)) as viewer:
+    relief = rel.make_relief(mesh, rel.ReliefParams(k=8, depth=20, mode="attenuation"), on_stage=viewer)
+    viewer.finish(relief)
+    viewer.wait()
+print("went on", len(relief.stages), flush=True)
+rel.show_stages(relief)
+print("shown again", flush=True)
+viewer(relief.stages["scene"])  # nobody is there any more
+"""
+
+
+@pytest.mark.slow
+def test_a_script_is_followed_and_goes_on(screen, tmp_path):
+    import open3d as o3d
+
+    from shapes import bust, to_mesh
+
+    scene = tmp_path / "scene.ply"
+    o3d.io.write_triangle_mesh(str(scene), to_mesh(bust(20)))
+    (tmp_path / "script.py").write_text(SCRIPT)
+    program = Program(
+        screen,
+        [sys.executable, "script.py", str(scene)],
+        tmp_path,
+        PYTHONPATH=os.environ.get("PYTHONPATH", ""),
+    )
+    try:
+        program.wait_for("10/10 trim")
+        screen.do("windowfocus", screen.window("o3d-relief"))
+        screen.do("key", "q")
+        shown = program.wait_for("10/10 trim", program.wait_for("went on 10"))
+        screen.do("windowfocus", screen.window("o3d-relief"))
+        screen.do("key", "q")
+        program.wait_for("shown again", shown)
+        assert program.process.wait(timeout=60) == 0
+    finally:
+        program.end()
+    assert not any("Error" in line for line in program.lines())
+
+
+def test_no_display(monkeypatch):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with pytest.raises(DisplayError, match="there is no display"):
+        StageViewer()
+
+
+def test_a_view_is_a_view():
+    with pytest.raises(ParameterError, match="view must be a View"):
+        StageViewer(view="front")
