@@ -306,4 +306,7 @@ def chosen_params(options: argparse.Namespace) -> ReliefParams:
         A value out of its range.
     """
     names = [name for name in ReliefParams.__dataclass_fields__ if name != "weights"]  # one for each vertex
-    return ReliefParams(**{name: getattr(options, name) for name in names})
+    given = {name: getattr(options, name) for name in names}
+    if given["depth"] is None:
+        given["depth"] = options.depth_mm  # stands in until the scene is read and its scale is known
+    return ReliefParams(**given)
