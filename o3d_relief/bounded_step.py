@@ -19,6 +19,9 @@ from o3d_relief.steps import on_plane
 
 __all__ = ["bounded_step"]
 
+_SHALLOWEST = 1e-3
+"""Smallest depth in relief units: what is closer together nothing here tells apart."""
+
 _EMPTY = 1e-3
 """Stiffness of the springs across gaps in bounded mode: empty space gives depth away for nothing, the springs
 only settle what nothing else does."""
@@ -41,7 +44,7 @@ def bounded_step(
     partly = ~visible[faces[face]].all(axis=1)
     seen = point_rows(faces, face[partly], share[partly], n)
     lowest = lowest_seen(z, seen, visible)
-    depth = cast(float, params.depth) / scene.unit
+    depth = _wanted_depth(scene, params)
     deep = float(z.max()) - lowest
     if deep <= depth:
         shallow = {"already_shallower": 1, "attached_missed": int((z[attached] > lowest).sum())}
@@ -78,6 +81,17 @@ def bounded_step(
     return BoundedStage(
         face_weight=weight, attached=attached, energy_gap=found.gap, z=on_plane(found.z), counts=counts
     )
+
+
+def _wanted_depth(scene: SceneStage, params: ReliefParams) -> float:
+    """Return the depth in relief units."""
+    wanted = cast(float, params.depth)
+    if wanted < _SHALLOWEST * scene.unit:
+        raise ParameterError(
+            f"depth must be at least {_SHALLOWEST * scene.unit:.3g} for this scene, 1/100,000 of its width "
+            f"or height: less cannot be told from none. Got {wanted:.3g} instead."
+        )
+    return wanted / scene.unit
 
 
 def _attached(scene: SceneStage, params: ReliefParams) -> NDArray[np.int64]:

@@ -30,7 +30,7 @@ _sometimes = {
 }
 _depth = st.fixed_dictionaries(
     {
-        "depth": _one_of([1e-9, 1.0, 1e9]),
+        "depth": _one_of([1e-9, 0.01, 1.0, 1e9]),
         "min_gap": _one_of([0.0, 1e-9, 3.0, 1e12]),
         "in_order": st.just(True),
     }

@@ -105,9 +105,9 @@ def _serve(pipe: Connection) -> None:
         "OMP_NUM_THREADS": "1",
         "OPENBLAS_NUM_THREADS": "1",
     }
-    from o3d_relief import steps
+    from o3d_relief import bounded_step, steps
     from o3d_relief.bounds import certificate
-    from o3d_relief.linalg import solve
+    from o3d_relief.linalg import interior, solve
     from o3d_relief.stages import attenuation, clustering
 
     if sys.platform == "linux":
@@ -117,9 +117,10 @@ def _serve(pipe: Connection) -> None:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     # A million rays for a mesh of fifty vertices, and to look for the libraries that use threads before each
     # small system, would be nearly all of the time.
-    for module in (steps, certificate):
+    for module in (steps, bounded_step, certificate):
         module.grid_pairs = partial(module.grid_pairs, side=_GRID)
-    for module in (solve, clustering, attenuation):
+    bounded_step.seen_points = partial(bounded_step.seen_points, side=_GRID)
+    for module in (solve, interior, clustering, attenuation):
         module.threadpool_limits = _no_limits
     warnings.simplefilter("error")
     with tempfile.TemporaryDirectory(prefix="o3d-relief-fuzz-") as folder:

@@ -65,6 +65,15 @@ def test_scene_that_is_shallow_already_is_left_alone(mesh):
     assert z == pytest.approx(again.stages["scene"].vertices[:, 2] + z.min())
 
 
+def test_very_little_depth_is_met(mesh):
+    unit = rel.make_relief(mesh, rel.ReliefParams(depth=1000)).stages["scene"].unit
+    relief = rel.make_relief(mesh, rel.ReliefParams(depth=1.001e-3 * unit))
+    assert heights(relief).max() == pytest.approx(1.001e-3 * unit)
+    assert relief.certificate.visible_behind == 0
+    with pytest.raises(rel.ParameterError, match="depth must be at least"):
+        rel.make_relief(mesh, rel.ReliefParams(depth=0.999e-3 * unit))
+
+
 def test_loose_parts_keep_contact_and_order():
     floor = moved(grid(21), (0, 0, 0))
     ball = moved(sphere(16, 12.0), (10, 5, 12))

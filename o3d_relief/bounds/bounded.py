@@ -118,12 +118,12 @@ def closest_relief(
     pairs = pairs.select(pairs.gap > _TOUCH / 2.0)
     lowest = lowest_seen(z, seen, visible)
     ratio = depth / (float(z.max()) - lowest)
-    inside = _MARGIN * depth + (1.0 - 2.0 * _MARGIN) * ratio * (z - lowest) - z
+    inside = _MARGIN * depth + (1.0 - 2.0 * _MARGIN) * ratio * (z - lowest)
 
     held = np.zeros(n)
     held[attach] = _HOLD
     hessian = (form + sp.diags_array(held + _LOOSE)).tocsr()
-    lower = np.where(visible & (held == 0.0), -z, -np.inf)
+    lower = np.where(visible & (held == 0.0), 0.0, -np.inf)
     # Linear scaling must keep a little of its room: that is as far as a smallest gap can be asked for here.
     kept = np.clip(np.minimum(pairs.gap, min_gap), _KEPT_GAP * ratio * pairs.gap, 0.7 * ratio * pairs.gap)
     place = _Place(gap_rows(pairs, n), seen, visible, attach, depth)
@@ -133,26 +133,27 @@ def closest_relief(
     def missed(
         x: NDArray[np.float64], accepted: NDArray[np.float64]
     ) -> tuple[sp.csr_array, NDArray[np.float64]]:
-        wrong = between.missed_pairs(place(z + x))
-        there = np.subtract(*wrong.heights(z + accepted))
+        wrong = between.missed_pairs(place(x))
+        there = np.subtract(*wrong.heights(accepted))
         least = np.minimum(_KEPT_GAP * ratio * wrong.gap, there / 2.0)
         # What touches has no order; it may turn about the point of contact a little.
         least = np.where(wrong.gap > _TOUCH, least, -_TOUCH / 4.0)
         usable = there > least + _TOUCH / 1000.0
         added[0] += int(usable.sum())
-        return gap_rows(wrong.select(usable), n), (least - wrong.gap)[usable]
+        return gap_rows(wrong.select(usable), n), least[usable]
 
     found = minimise(
         hessian,
         pull - held * z,
+        origin=z,
         start=inside,
         lower=lower,
-        upper=depth - z,
+        upper=np.full(n, depth),
         rows=sp.vstack([gap_rows(pairs, n), seen]).tocsr(),
-        bound=np.concatenate([kept - pairs.gap, -(seen @ z)]),
+        bound=np.concatenate([kept, np.zeros(seen.shape[0])]),
         more_rows=missed,
     )
-    result = place(z + found.x)
+    result = place(found.x)
     return Bounded(
         z=result,
         rounds=found.rounds,

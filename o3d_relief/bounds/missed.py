@@ -44,8 +44,10 @@ class BetweenLines:
         before = self._vertices[:, 2]
         relief = np.column_stack([self._vertices[:, :2], z])
         met = crossings(relief, self._faces, self._edges)
-        fresh = met.select(met.pierced(z) & ~met.pierced(before))
-        found = fresh.pairs(before, z)
+        new = met.pierced(z) & ~met.pierced(before)
+        new &= (z[met.face].max(axis=1) > 0.0) & (z[met.edge].max(axis=1) > 0.0)
+        found = met.select(new).pairs(before, z)
+        found = found.select(np.maximum(*found.heights(z)) > 0.0)
         if len(found) == 0:
             stacked = vertex_pairs(relief, self._faces)
             gap = np.subtract(*stacked.heights(before))
@@ -58,4 +60,5 @@ class BetweenLines:
                 gap=-gap[gap < -_SAME],
             )
             found = Pairs.join([turned, foot_pairs(self._vertices, self._faces, self._edges, z)])
-        return found.select(np.maximum(*found.heights(z)) > 0.0)
+            found = found.select(np.maximum(*found.heights(z)) > 0.0)
+        return found

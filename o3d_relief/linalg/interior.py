@@ -19,7 +19,7 @@ _TO_THE_WALL = 0.98
 """Share of the way to the nearest constraint that a step may go."""
 
 _FIRST_BARRIER = 0.3
-"""Complementarity at the start, as a share of x' H x / 2."""
+"""Complementarity at the start, as a share of (x - o)' H (x - o) / 2."""
 
 _CHECK_EVERY = 3
 """Rounds after which further rows are asked for."""
@@ -52,7 +52,7 @@ class Minimum:
     watched : int
         Rows that took part.
     gap : float
-        Bound on how far the objective is above its minimum, as a share of x' H x / 2.
+        Bound on how far the objective is above its minimum, as a share of (x - o)' H (x - o) / 2.
     """
 
     x: Vector
@@ -65,6 +65,7 @@ def minimise(
     form: sp.csr_array,
     pull: Vector,
     *,
+    origin: Vector,
     start: Vector,
     lower: Vector,
     upper: Vector,
@@ -73,7 +74,7 @@ def minimise(
     more_rows: MoreRows,
     accuracy: float = 0.03,
 ) -> Minimum:
-    """Minimise x' H x / 2 - pull' x  subject to  lower <= x <= upper  and  R x >= bound.
+    """Minimise (x - o)' H (x - o) / 2 - pull' x  subject to  lower <= x <= upper  and  R x >= bound.
 
     A primal-dual interior point method, whose iterates lie strictly inside all constraints. Each round
     solves one linear system, H plus springs on the constraints, by conjugate gradients with smoothed
@@ -85,6 +86,8 @@ def minimise(
     form : (n, n) sparse float64
         H, positive semi-definite, and definite together with the bounds.
     pull : (n,) float64
+    origin : (n,) float64
+        o.
     start : (n,) float64
         Strictly inside all constraints.
     lower, upper : (n,) float64
@@ -97,14 +100,15 @@ def minimise(
         second fulfils, none when all is well. Asked now and then, and at the end: what it accepted last is
         returned. `start` counts as accepted.
     accuracy : float
-        Gap between the objective and its dual, as a share of x' H x / 2, at which the iteration stops.
+        Gap between the objective and its dual, as a share of (x - o)' H (x - o) / 2, at which the iteration
+        stops.
 
     Returns
     -------
     Minimum
     """
     with threadpool_limits(limits=1):  # sums that do not depend on the number of threads
-        return _Iteration(form, pull, start, lower, upper, rows, bound).run(accuracy, more_rows)
+        return _Iteration(form, pull, origin, start, lower, upper, rows, bound).run(accuracy, more_rows)
 
 
 class _Iteration:
@@ -114,13 +118,14 @@ class _Iteration:
         self,
         form: sp.csr_array,
         pull: Vector,
+        origin: Vector,
         start: Vector,
         lower: Vector,
         upper: Vector,
         rows: sp.csr_array,
         bound: Vector,
     ) -> None:
-        self.form, self.pull = form, pull
+        self.form, self.pull, self.origin = form, pull, origin
         self.x = start
         self.at_lower, self.at_upper = np.flatnonzero(np.isfinite(lower)), np.flatnonzero(np.isfinite(upper))
         self.lower, self.upper = lower[self.at_lower], upper[self.at_upper]
@@ -133,8 +138,8 @@ class _Iteration:
         self.rounds = 0
 
     def _energy(self) -> float:
-        x = self.x
-        return float(0.5 * (x @ (self.form @ x)))
+        moved = self.x - self.origin
+        return float(0.5 * (moved @ (self.form @ moved)))
 
     def _slacks(self) -> list[Vector]:
         x = self.x
@@ -239,7 +244,7 @@ class _Iteration:
         diagonal[self.at_lower] += stiffness[0]
         diagonal[self.at_upper] += stiffness[1]
         system = self.form + sp.diags_array(diagonal)
-        right = self.pull - self.form @ self.x
+        right = self.pull - self.form @ (self.x - self.origin)
         right[self.at_lower] += push[0]
         right[self.at_upper] -= push[1]
         if len(some):

@@ -34,3 +34,18 @@ def test_what_lies_behind_the_plane_does_not_count():
     vertices, faces = joined(grid(6), moved(grid(4, size=40.0), (3.0, 5.0, 10.0)))
     z = np.where(vertices[:, 2] > 5.0, -4.0, -1.0)
     assert len(BetweenLines(vertices, faces).missed_pairs(z)) == 0
+
+
+def test_what_crosses_behind_the_plane_hides_nothing_in_front():
+    # Two sheets that changed places in front of S, and beside them two that cross behind it.
+    low, high = grid(6), moved(grid(4, size=40.0), (3.0, 5.0, 10.0))
+    beside = [moved(part, (200.0, 0.0, 0.0)) for part in (low, high)]
+    vertices, faces = joined(low, high, *beside)
+    upper, right = vertices[:, 2] > 5.0, vertices[:, 0] > 100.0
+    swapped, tilted = (
+        np.where(upper, 4.0, 9.0),
+        np.where(upper, -20.0 - 0.1 * (vertices[:, 0] - 203.0), -20.0),
+    )
+    found = BetweenLines(vertices, faces).missed_pairs(np.where(right, tilted, swapped))
+    assert len(found) > 0
+    assert (vertices[found.upper, 0] < 100.0).all()

@@ -10,11 +10,14 @@ def nothing_more(_x, accepted):
     return sp.csr_array((0, len(accepted))), np.zeros(0)
 
 
-def solve(form, pull, start, *, lower=None, upper=None, rows=None, bound=None, more_rows=nothing_more):
+def solve(
+    form, pull, start, *, origin=None, lower=None, upper=None, rows=None, bound=None, more_rows=nothing_more
+):
     n = len(pull)
     return minimise(
         sp.csr_array(form),
         np.asarray(pull, dtype=float),
+        origin=np.zeros(n) if origin is None else np.asarray(origin, dtype=float),
         start=np.asarray(start, dtype=float),
         lower=np.full(n, -np.inf) if lower is None else np.asarray(lower, dtype=float),
         upper=np.full(n, np.inf) if upper is None else np.asarray(upper, dtype=float),
@@ -31,6 +34,12 @@ def test_bounds_of_a_hand_made_problem():
     assert found.x == pytest.approx([1.0, -1.0], abs=1e-4)
     assert found.x[0] < 1.0
     assert found.x[1] > -1.0
+
+
+def test_the_energy_is_that_of_the_way_from_the_origin():
+    # min (x - 5)^2 / 2 + (y + 3)^2 / 2 with x <= 1 and y >= -1
+    found = solve(np.eye(2), [0, 0], [0.5, 0.5], origin=[5, -3], lower=[-np.inf, -1], upper=[1, np.inf])
+    assert found.x == pytest.approx([1.0, -1.0], abs=1e-4)
 
 
 def test_row_of_a_hand_made_problem():
