@@ -98,6 +98,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", nargs="?", type=Path, default=os.environ.get("O3D_RELIEF_DATA"))
     parser.add_argument("--shapes", nargs="+", choices=SHAPES, default=["rectangle", "contour"])
+    parser.add_argument("--mode", choices=["attenuation", "bounded"], help="of the relief (default: bounded)")
     parser.add_argument("--only", nargs="+", metavar="NAME", help="files whose names contain one of these")
     options = parser.parse_args()
     if options.folder is None:
@@ -114,7 +115,7 @@ def main() -> None:
             depth = relief_depth(mesh, view, params)
             started = time.process_time()
             if depth not in reliefs:
-                relief = rel.make_relief(mesh, rel.ReliefParams(depth=depth), view=view)
+                relief = rel.make_relief(mesh, rel.ReliefParams(depth=depth, mode=options.mode), view=view)
                 reliefs[depth] = relief, time.process_time() - started
             relief, relief_seconds = reliefs[depth]
             started = time.process_time()

@@ -345,4 +345,8 @@ def chosen_params(options: argparse.Namespace) -> ReliefParams:
     ParameterError
         A value out of its range.
     """
-    return ReliefParams(**{name: getattr(options, name) for name in ReliefParams.__dataclass_fields__})
+    given = {name: getattr(options, name) for name in ReliefParams.__dataclass_fields__}
+    if given["depth"] is None:
+        # Stands in until the scene is read and its scale is known; not every command has it.
+        given["depth"] = getattr(options, "depth_mm", None)
+    return ReliefParams(**given)

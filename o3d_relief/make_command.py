@@ -43,7 +43,8 @@ def make(options: argparse.Namespace) -> int:
     ReliefError
         Anything that the user can mend.
     """
-    params, view, plate = chosen_params(options), chosen_view(options), chosen_plate(options)
+    plate = chosen_plate(options)
+    params, view = chosen_params(options), chosen_view(options)
     mill, tiles, scan = chosen_mill(options), chosen_tiles(options), chosen_scan(options)
     check_workshop(plate, mill, tiles)
     check_exists(options.input)

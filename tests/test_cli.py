@@ -457,6 +457,17 @@ def test_wrong_sizes_write_nothing(tmp_path, scene, capsys, words, sentence):
     assert _files(tmp_path) == ["scene.ply"]
 
 
+@pytest.mark.parametrize("words", [("--mode", "bounded"), ("--attach", "3"), ("--mode", "attenuation")])
+def test_a_depth_in_millimetres_is_a_depth_for_every_mode(tmp_path, scene, capsys, words):
+    report = tmp_path / "r.json"
+    solid = ("--width-mm", "90", "--depth-mm", "15", "--report", str(report))
+    assert main(["make", str(scene), str(tmp_path / "r.stl"), "-k", "16", *solid, *words]) == 0
+    said = json.loads(report.read_text())
+    assert said["mode"] == ("attenuation" if "attenuation" in words else "bounded")
+    assert said["solid"]["size_mm"][2] == pytest.approx(15.0, abs=1e-6)
+    assert said["solid"]["counts"]["depth_ratio"] == pytest.approx(1.0, abs=0.05)
+
+
 @pytest.mark.slow
 def test_a_picture_of_the_walls(tmp_path, scene):
     out = tmp_path / "walls.png"

@@ -44,7 +44,7 @@ def test_undamaged_meshes_give_a_relief(pool, name):
 
 @pytest.mark.slow
 def test_damaged_files(pool):
-    @settings(REPEATABLE, max_examples=400)
+    @settings(REPEATABLE, max_examples=260)
     @given(file_cases())
     def run(case: Case) -> None:
         _check(pool, case)
@@ -54,7 +54,7 @@ def test_damaged_files(pool):
 
 @pytest.mark.slow
 def test_damaged_meshes(pool):
-    @settings(REPEATABLE, max_examples=300)
+    @settings(REPEATABLE, max_examples=180)
     @given(mesh_cases())
     def run(case: Case) -> None:
         _check(pool, case)
@@ -64,7 +64,7 @@ def test_damaged_meshes(pool):
 
 @pytest.mark.slow
 def test_damaged_clouds(pool):
-    @settings(REPEATABLE, max_examples=100)
+    @settings(REPEATABLE, max_examples=80)
     @given(cloud_cases())
     def run(case: Case) -> None:
         _check(pool, case)

@@ -1,49 +1,23 @@
 """The pipeline on real meshes: unwelded, non-manifold, slivered, of many parts."""
 
-import csv
+from functools import partial
 
 import numpy as np
 import pytest
 from scipy.sparse.csgraph import connected_components
 
 import o3d_relief as rel
+from real_meshes import VIEWS, real_relief
 from shapes import turn
 
 pytestmark = [pytest.mark.data, pytest.mark.slow]
 
-MESHES = [
-    "broken_chair.obj",
-    "bunny_zipper.ply",
-    "bust_igea.ply",
-    "dragon_full_871k.ply",
-    "dragon_res2.ply",
-    "gargoyle_vertexcolor.ply",
-    "igea_tristrips_original.ply",
-    "lucy_100k.ply",
-    "robot_steampunk_textured.glb",
-    "scene_japanese_temple.obj",
-    "scene_macross_city.glb",
-    "statue_penelope.ply",
-]
+MESHES = list(VIEWS)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def reliefs(data_folder):
-    """Make each relief once, when it is first asked for."""
-    with (data_folder / "MANIFEST.tsv").open() as file:
-        rows = {row["file"]: row for row in csv.DictReader(file, delimiter="\t")}
-    done = {}
-
-    def get(name):
-        if name not in done:
-            side, up = rows[name]["suggested_view_from"].split()[0], rows[name]["up"]
-            front = {"z+": "z", "y+": "y", "y-": "-y"}[side]
-            done[name] = rel.make_relief(
-                rel.read_mesh(data_folder / name), rel.ReliefParams(k=128), view=rel.View(front=front, up=up)
-            )
-        return done[name]
-
-    return get
+    return partial(real_relief, data_folder)
 
 
 @pytest.mark.parametrize("name", MESHES)

@@ -14,6 +14,7 @@ _TOO_SHORT = "it ends too early, part of it is missing"
 _HEADER_ENDS = ("ascii", "binary", "binary_compressed")
 
 
+@np.errstate(invalid="ignore")  # to float64 go the signalling kinds of NaN, too
 def decode_pcd(data: bytes) -> CloudArrays:
     r"""Read a PCD file.
 

@@ -20,8 +20,8 @@ __all__ = ["Estimate", "estimate_solid", "relief_depth"]
 
 _LINES = 256
 """Lines along x and along y that measure how high the scene stands."""
-_FLATTENED = 0.65
-"""Heights in a relief over those in proportion: most of it comes closer to S; 0.45 to 0.8 measured."""
+_ATTENUATED, _BOUNDED = 0.45, 0.95
+"""Heights in a relief over those in proportion, in each mode: 0.1 to 0.7 and 0.94 to 0.98 were measured."""
 _MEGABYTES, _BYTES_PER_TRIANGLE = 600.0, 1000.0
 """Peak memory, measured on scenes of 20,000 to 870,000 triangles."""
 
@@ -87,7 +87,7 @@ def estimate_solid(
     total_height = (plate.width_mm - 2.0 * plate.edge_mm) * height / width + 2.0 * plate.edge_mm
     share = {"rectangle": 1.0, "ellipse": np.pi / 4.0, "contour": covered, "none": 0.0}[plate.shape]
     volume = plate.width_mm * total_height * share * plate.back_mm
-    volume += width * height * covered * mean_height * _FLATTENED * depth
+    volume += width * height * covered * mean_height * depth * (_BOUNDED if params.bounded else _ATTENUATED)
     return Estimate(
         size_mm=(plate.width_mm, float(total_height), float(depth + plate.back_mm)),
         depth_known=known,

@@ -54,6 +54,15 @@ class TestPcd:
         assert np.array_equal(arrays.normals, NORMALS)
         np.testing.assert_allclose(arrays.colors, COLORS / 255)
 
+    def test_every_kind_of_nan(self, tmp_path):
+        rows = np.ones(70, dtype="<f4,<f4,<f4,<f4,<f4,<f4")
+        rows.view("<u4")[:12] = 0x7F800001  # a signalling one, in two points and their normals
+        head = pcd("binary", "x y z normal_x normal_y normal_z", "4 4 4 4 4 4", "F F F F F F")
+        arrays = read_arrays(save(tmp_path / "a.pcd", head.encode() + rows.tobytes()))
+        assert np.isnan(arrays.points[:2]).all()
+        assert np.isnan(arrays.normals[:2]).all()
+        assert (arrays.points[2:] == 1.0).all()
+
     def test_colors_as_the_bits_of_a_float(self, tmp_path):
         head = pcd("ascii", "x y z rgb", "4 4 4 4", "F F F F")
         floats = packed(COLORS).view("<f4").astype(float)
