@@ -131,7 +131,7 @@ def _through_joblib(parallel: Callable[[], Any]) -> Callable[[Sequence[BatchTask
     def run(tasks: Sequence[BatchTask]) -> Entries:
         results = parallel()(delayed(run_task)(task) for task in tasks)
         try:
-            for entry in results:  # `yield from` would close it, too, and let its warning out
+            for entry in results:  # noqa: UP028, which would close it, too, and let its warning out
                 yield entry
         finally:
             with warnings.catch_warnings():

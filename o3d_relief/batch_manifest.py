@@ -179,10 +179,10 @@ class Manifest:
         self._path = folder / MANIFEST
         self.notes = Notes(folder)
         self.entries: dict[str, BatchEntry] = {}
-        for entry in (*self._lines(), *self.notes.kept()):
+        for entry in self._lines():
             self.entries[entry.input] = entry
-        if self.entries:
-            self.tidy()
+        if self.notes.kept():
+            self.settle()
         self.notes.remove()  # from here on, notes are those of this run
 
     def _lines(self) -> list[BatchEntry]:
@@ -210,14 +210,19 @@ class Manifest:
         with self._path.open("a", encoding="utf-8", newline="\n") as file:
             file.write(entry.line())
 
-    def tidy(self, order: Iterable[str] = ()) -> None:
-        """Write the manifest anew, one line for each input.
+    def settle(self, order: Iterable[str] = ()) -> None:
+        """Write the manifest anew, one line for each input, with what only the notes say; remove these.
 
         Parameters
         ----------
         order : iterable of str
             Inputs that come first; others that the folder holds follow.
         """
+        for entry in self.notes.kept():
+            # What was ended between the note and the file has no relief, or an older one.
+            if not entry.made or entry.holds(self._path.parent, entry.recipe):
+                self.entries[entry.input] = entry
         inputs = dict.fromkeys([*order, *self.entries])
         self.entries = {source: self.entries[source] for source in inputs if source in self.entries}
         write_bytes(self._path, "".join(entry.line() for entry in self.entries.values()).encode())
+        self.notes.remove()

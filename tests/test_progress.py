@@ -40,6 +40,7 @@ def test_every_stage_is_told_from_its_beginning_to_its_end(depth, long):
         shares = watcher.shares(stage)
         assert shares[0] is None
         assert shares[-1] == 1.0
+        assert shares.count(1.0) == 1
         known = [share for share in shares if share is not None]
         assert known == sorted(known)
         assert all(0.0 <= share <= 1.0 for share in known)
@@ -105,8 +106,10 @@ def test_what_was_told_is_not_taken_back():
     progress.begin("order")
     for share in (0.3, None, 0.1, 0.6):
         progress.tick(share)
+    progress.tick(1.0)  # not done before its end
+    progress.end()
     progress.begin("trim")
-    assert watcher.told == [("order", s) for s in (None, 0.3, 0.3, 0.3, 0.6)] + [("trim", None)]
+    assert watcher.told == [("order", s) for s in (None, 0.3, 0.3, 0.3, 0.6, 0.99, 1.0)] + [("trim", None)]
 
 
 @pytest.mark.parametrize(
