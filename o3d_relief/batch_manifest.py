@@ -142,13 +142,12 @@ class Notes:
 
     def entry(self, source: str) -> BatchEntry | None:
         """Return the entry that was kept of an input, None for none."""
-        path = self._path(source, "json")
-        return BatchEntry.from_line(path.read_text(encoding="utf-8")) if path.exists() else None
+        return _read_note(self._path(source, "json"))
 
     def kept(self) -> list[BatchEntry]:
         """Return all entries that were kept."""
-        paths = sorted(self._folder.glob("*.json"))
-        return [BatchEntry.from_line(path.read_text(encoding="utf-8")) for path in paths]
+        found = [_read_note(path) for path in sorted(self._folder.glob("*.json"))]
+        return [entry for entry in found if entry is not None]
 
     def remove(self) -> None:
         """Take all notes away."""
@@ -156,6 +155,14 @@ class Notes:
 
     def _path(self, source: str, ending: str) -> Path:
         return self._folder / f"{sha256(source.encode('utf-8', 'surrogateescape')).hexdigest()[:32]}.{ending}"
+
+
+def _read_note(path: Path) -> BatchEntry | None:
+    """Return the entry, None where there is none: after a power cut a file may be there without its bytes."""
+    try:
+        return BatchEntry.from_line(path.read_text(encoding="utf-8"))
+    except (FileNotFoundError, ValueError):
+        return None
 
 
 class Manifest:

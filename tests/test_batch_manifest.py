@@ -79,6 +79,15 @@ def test_a_note_without_its_relief_is_no_entry(tmp_path, made):
     assert Manifest(tmp_path).entries == {}
 
 
+def test_a_note_without_its_bytes_is_none(tmp_path):
+    notes = Notes(tmp_path)
+    notes.keep(failed("a"))
+    (note,) = tmp_path.rglob("*.json")
+    note.write_bytes(bytes(note.stat().st_size))
+    assert notes.entry("a") is None
+    assert notes.kept() == []
+
+
 def test_the_last_word_on_an_input_counts(tmp_path, made):
     manifest = Manifest(tmp_path)
     manifest.add(failed("x"))
