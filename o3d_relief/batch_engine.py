@@ -16,6 +16,9 @@ __all__ = ["ENGINES", "Engine", "open_engine"]
 
 ENGINES = ("loky", "dask", "ray")
 
+_PATIENCE = 60
+"""Seconds in which a cluster must have a worker."""
+
 
 Entries = Generator[BatchEntry, None, None]
 
@@ -86,6 +89,7 @@ def _loky(_scheduler: str | None, jobs: int | None, _stack: ExitStack) -> Engine
 def _dask(scheduler: str | None, jobs: int | None, stack: ExitStack) -> Engine:
     try:
         from distributed import Client, LocalCluster
+        from distributed import TimeoutError as TooLate
         from distributed.scheduler import KilledWorker
     except ImportError as error:
         raise ReliefError("The engine dask is not installed: pip install 'o3d-relief[dask]'.") from error
@@ -98,10 +102,11 @@ def _dask(scheduler: str | None, jobs: int | None, stack: ExitStack) -> Engine:
         scheduler = stack.enter_context(cluster).scheduler_address
     try:
         client = stack.enter_context(Client(scheduler, set_as_default=False))
-    except (OSError, ValueError) as error:
+        client.wait_for_workers(1, timeout=_PATIENCE)
+    except (OSError, ValueError, TooLate) as error:
         raise ReliefError(
-            f"The Dask scheduler at {scheduler} does not answer ({error}): start it with dask scheduler, and "
-            "workers with dask worker ADDRESS --nthreads 1."
+            f"The Dask scheduler at {scheduler} does not answer, or has no workers ({error}): start it with "
+            "dask scheduler, and workers with dask worker ADDRESS --nthreads 1."
         ) from error
 
     def allowed_failures(dask_scheduler: Any) -> int:  # in here, it goes to a scheduler without this package
