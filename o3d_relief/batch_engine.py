@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import warnings
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -147,6 +148,13 @@ def _through_joblib(parallel: Callable[[], Any]) -> Callable[[Sequence[BatchTask
     return run
 
 
+def _knock(address: str) -> None:
+    """Connect to a Ray cluster; OSError where nobody is there. Ray itself would try for minutes."""
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    if host and port.isdigit():
+        socket.create_connection((host, int(port)), timeout=_PATIENCE).close()
+
+
 def _ray(scheduler: str | None, jobs: int | None, stack: ExitStack) -> Engine:
     # Not through joblib: its Ray backend returns nothing before all is done.
     try:
@@ -156,9 +164,13 @@ def _ray(scheduler: str | None, jobs: int | None, stack: ExitStack) -> Engine:
 
     where = {"num_cpus": jobs, "include_dashboard": False} if scheduler is None else {"address": scheduler}
     try:
+        if scheduler is not None:
+            _knock(scheduler)
         ray.init(**where, log_to_driver=False, logging_level="error")
-    except (ConnectionError, ValueError, RuntimeError) as error:
-        raise ReliefError(f"The Ray cluster at {scheduler} does not answer: {error}") from error
+    except (OSError, ValueError, RuntimeError) as error:
+        raise ReliefError(
+            f"The Ray cluster at {scheduler} does not answer ({error}): start it with ray start --head."
+        ) from error
     stack.callback(ray.shutdown)
     # Ray begins a task again whose worker was lost; the task itself knows when to give up.
     remote = ray.remote(num_cpus=1, max_retries=MOST_ATTEMPTS)(run_task)

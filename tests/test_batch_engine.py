@@ -26,6 +26,13 @@ def test_an_engine_that_is_not_installed(monkeypatch, engine, module):
         pass
 
 
+@pytest.mark.parametrize("address", ["127.0.0.1:9", "ray://127.0.0.1:9"])
+def test_a_ray_cluster_that_is_not_there(address):
+    pytest.importorskip("ray")
+    with pytest.raises(ReliefError, match="does not answer"), open_engine("ray", address, None):
+        pass
+
+
 def test_a_cluster_that_is_not_there():
     pytest.importorskip("distributed")  # has to be there before its settings are changed
     dask = pytest.importorskip("dask")
