@@ -33,17 +33,6 @@ def test_a_ray_cluster_that_is_not_there(address):
         pass
 
 
-def test_a_cluster_that_is_not_there():
-    pytest.importorskip("distributed")  # has to be there before its settings are changed
-    dask = pytest.importorskip("dask")
-    with (
-        dask.config.set({"distributed.comm.timeouts.connect": "0.2s"}),
-        pytest.raises(ReliefError, match="does not answer, or has no workers"),
-        open_engine("dask", "tcp://127.0.0.1:9", None),
-    ):
-        pass
-
-
 def test_a_cluster_without_workers_or_patience(monkeypatch):
     distributed = pytest.importorskip("distributed")
     monkeypatch.setattr("o3d_relief.batch_engine._PATIENCE", 0.5)
@@ -58,3 +47,14 @@ def test_a_cluster_without_workers_or_patience(monkeypatch):
         sentence = "gives a task up after 1 lost workers, too early to tell"
         with pytest.raises(ReliefError, match=sentence), open_engine("dask", address, None):
             pass
+
+
+def test_a_cluster_that_is_not_there():
+    pytest.importorskip("distributed")  # has to be there before its settings are changed
+    dask = pytest.importorskip("dask")
+    with (
+        dask.config.set({"distributed.comm.timeouts.connect": "0.2s"}),
+        pytest.raises(ReliefError, match="does not answer, or has no workers"),
+        open_engine("dask", "tcp://127.0.0.1:9", None),
+    ):
+        pass
