@@ -94,8 +94,8 @@ def make_reliefs(
     on_done : callable, optional
         Called with the entry of each input as soon as it is done; not for those that were done already.
     on_progress : callable, optional
-        Called with "batch" and the share of the inputs that are done, at the start and after each. Where it
-        returns False, or raises, the workers are ended; what is done stays.
+        Called with "batch" and the share of the inputs that are done, at the start and after each, and with 1
+        at the end. Where it returns False, or raises, the workers are ended; what is done stays.
 
     Returns
     -------
@@ -143,9 +143,9 @@ def make_reliefs(
     finally:
         for place in (folder, folder / PICTURES):
             clear_leftovers(place)
-        manifest.tidy(sources)
-    manifest.notes.remove()
+        manifest.settle(sources)
     sheets = write_sheets(folder, manifest.entries.values())
+    progress.end()
     return Batch(
         entries=tuple(manifest.entries[source] for source in sources), already_done=done, sheets=tuple(sheets)
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import warnings
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -15,6 +16,9 @@ from o3d_relief.errors import ParameterError, ReliefError
 __all__ = ["ENGINES", "Engine", "open_engine"]
 
 ENGINES = ("loky", "dask", "ray")
+
+_PATIENCE = 60
+"""Seconds in which a cluster must have a worker."""
 
 
 Entries = Generator[BatchEntry, None, None]
@@ -86,6 +90,7 @@ def _loky(_scheduler: str | None, jobs: int | None, _stack: ExitStack) -> Engine
 def _dask(scheduler: str | None, jobs: int | None, stack: ExitStack) -> Engine:
     try:
         from distributed import Client, LocalCluster
+        from distributed import TimeoutError as TooLate
         from distributed.scheduler import KilledWorker
     except ImportError as error:
         raise ReliefError("The engine dask is not installed: pip install 'o3d-relief[dask]'.") from error
@@ -98,10 +103,11 @@ def _dask(scheduler: str | None, jobs: int | None, stack: ExitStack) -> Engine:
         scheduler = stack.enter_context(cluster).scheduler_address
     try:
         client = stack.enter_context(Client(scheduler, set_as_default=False))
-    except (OSError, ValueError) as error:
+        client.wait_for_workers(1, timeout=_PATIENCE)
+    except (OSError, ValueError, TooLate) as error:
         raise ReliefError(
-            f"The Dask scheduler at {scheduler} does not answer ({error}): start it with dask scheduler, and "
-            "workers with dask worker ADDRESS --nthreads 1."
+            f"The Dask scheduler at {scheduler} does not answer, or has no workers ({error}): start it with "
+            "dask scheduler, and workers with dask worker ADDRESS --nthreads 1."
         ) from error
 
     def allowed_failures(dask_scheduler: Any) -> int:  # in here, it goes to a scheduler without this package
@@ -131,7 +137,7 @@ def _through_joblib(parallel: Callable[[], Any]) -> Callable[[Sequence[BatchTask
     def run(tasks: Sequence[BatchTask]) -> Entries:
         results = parallel()(delayed(run_task)(task) for task in tasks)
         try:
-            for entry in results:  # `yield from` would close it, too, and let its warning out
+            for entry in results:  # noqa: UP028, which would close it, too, and let its warning out
                 yield entry
         finally:
             with warnings.catch_warnings():
@@ -140,6 +146,13 @@ def _through_joblib(parallel: Callable[[], Any]) -> Callable[[Sequence[BatchTask
                 results.close()
 
     return run
+
+
+def _knock(address: str) -> None:
+    """Connect to a Ray cluster; OSError where nobody is there. Ray itself would try for minutes."""
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    if host and port.isdigit():
+        socket.create_connection((host, int(port)), timeout=_PATIENCE).close()
 
 
 def _ray(scheduler: str | None, jobs: int | None, stack: ExitStack) -> Engine:
@@ -151,9 +164,13 @@ def _ray(scheduler: str | None, jobs: int | None, stack: ExitStack) -> Engine:
 
     where = {"num_cpus": jobs, "include_dashboard": False} if scheduler is None else {"address": scheduler}
     try:
+        if scheduler is not None:
+            _knock(scheduler)
         ray.init(**where, log_to_driver=False, logging_level="error")
-    except (ConnectionError, ValueError, RuntimeError) as error:
-        raise ReliefError(f"The Ray cluster at {scheduler} does not answer: {error}") from error
+    except (OSError, ValueError, RuntimeError) as error:
+        raise ReliefError(
+            f"The Ray cluster at {scheduler} does not answer ({error}): start it with ray start --head."
+        ) from error
     stack.callback(ray.shutdown)
     # Ray begins a task again whose worker was lost; the task itself knows when to give up.
     remote = ray.remote(num_cpus=1, max_retries=MOST_ATTEMPTS)(run_task)

@@ -142,13 +142,12 @@ class Notes:
 
     def entry(self, source: str) -> BatchEntry | None:
         """Return the entry that was kept of an input, None for none."""
-        path = self._path(source, "json")
-        return BatchEntry.from_line(path.read_text(encoding="utf-8")) if path.exists() else None
+        return _read_note(self._path(source, "json"))
 
     def kept(self) -> list[BatchEntry]:
         """Return all entries that were kept."""
-        paths = sorted(self._folder.glob("*.json"))
-        return [BatchEntry.from_line(path.read_text(encoding="utf-8")) for path in paths]
+        found = [_read_note(path) for path in sorted(self._folder.glob("*.json"))]
+        return [entry for entry in found if entry is not None]
 
     def remove(self) -> None:
         """Take all notes away."""
@@ -156,6 +155,14 @@ class Notes:
 
     def _path(self, source: str, ending: str) -> Path:
         return self._folder / f"{sha256(source.encode('utf-8', 'surrogateescape')).hexdigest()[:32]}.{ending}"
+
+
+def _read_note(path: Path) -> BatchEntry | None:
+    """Return the entry, None where there is none: after a power cut a file may be there without its bytes."""
+    try:
+        return BatchEntry.from_line(path.read_text(encoding="utf-8"))
+    except (FileNotFoundError, ValueError):
+        return None
 
 
 class Manifest:
@@ -179,10 +186,10 @@ class Manifest:
         self._path = folder / MANIFEST
         self.notes = Notes(folder)
         self.entries: dict[str, BatchEntry] = {}
-        for entry in (*self._lines(), *self.notes.kept()):
+        for entry in self._lines():
             self.entries[entry.input] = entry
-        if self.entries:
-            self.tidy()
+        if self.notes.kept():
+            self.settle()
         self.notes.remove()  # from here on, notes are those of this run
 
     def _lines(self) -> list[BatchEntry]:
@@ -210,14 +217,19 @@ class Manifest:
         with self._path.open("a", encoding="utf-8", newline="\n") as file:
             file.write(entry.line())
 
-    def tidy(self, order: Iterable[str] = ()) -> None:
-        """Write the manifest anew, one line for each input.
+    def settle(self, order: Iterable[str] = ()) -> None:
+        """Write the manifest anew, one line for each input, with what only the notes say; remove these.
 
         Parameters
         ----------
         order : iterable of str
             Inputs that come first; others that the folder holds follow.
         """
+        for entry in self.notes.kept():
+            # What was ended between the note and the file has no relief, or an older one.
+            if not entry.made or entry.holds(self._path.parent, entry.recipe):
+                self.entries[entry.input] = entry
         inputs = dict.fromkeys([*order, *self.entries])
         self.entries = {source: self.entries[source] for source in inputs if source in self.entries}
         write_bytes(self._path, "".join(entry.line() for entry in self.entries.values()).encode())
+        self.notes.remove()

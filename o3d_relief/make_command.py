@@ -67,10 +67,8 @@ def make(options: argparse.Namespace) -> int:
     try:
         if meshing is not None and (options.dry_run or plate is not None):
             # Its size must be known before the relief is made.
-            scene, meshing = (
-                scan_points(scene, meshing, view=view, on_stage=tell_stage, on_progress=bar).mesh,
-                None,
-            )
+            found = scan_points(scene, meshing, view=view, on_stage=tell_stage, on_progress=bar)
+            scene, meshing = found.mesh, None
         if options.dry_run:
             tell_estimate(scene, params, view, plate or PlateParams(), tell)
             return 0
@@ -88,7 +86,9 @@ def make(options: argparse.Namespace) -> int:
         made = None
         if plate is not None:
             free = options.undercut_free
-            made = make_checked(relief, plate, tell, mill=mill, undercut_free=free, tiles=tiles)
+            made = make_checked(
+                relief, plate, tell, mill=mill, undercut_free=free, tiles=tiles, on_progress=bar
+            )
     except MeshError as error:
         raise MeshError(f"{options.input}: {error}") from error
     finally:
@@ -99,17 +99,22 @@ def make(options: argparse.Namespace) -> int:
 
 
 def _write(options: argparse.Namespace, relief: Relief, made: Made | None, taken: set[Path]) -> None:
+    from o3d_relief.progress_bar import shown
     from o3d_relief.scene.write import write_mesh
     from o3d_relief.workshop import write_work
 
+    if options.strict or options.report is not None:
+        with shown("certificate"):
+            _ = relief.certificate  # it is kept
     if options.strict and relief.certificate.failures:
         raise ReliefError(f"{options.output} is not written (--strict): {relief.certificate.failures[0]}")
     if options.strict and made is not None and made.report.failures:
         raise ReliefError(f"{options.output} is not written (--strict): {made.report.failures[0]}")
-    if made is None:
-        write_mesh(options.output, relief.mesh)
-    else:
-        write_work(options.output, made.work, height_map=options.height_map, taken=taken)
+    with shown("writing"):
+        if made is None:
+            write_mesh(options.output, relief.mesh)
+        else:
+            write_work(options.output, made.work, height_map=options.height_map, taken=taken)
     if options.report is not None:
         write_report(options.report, relief, made)
     if options.walls is not None and made is not None:
@@ -138,10 +143,12 @@ def read_scene(path: Path, scan: ScanParams) -> tuple[TriangleMesh | PointCloud,
     ReliefError
         Anything that the user can mend.
     """
+    from o3d_relief.progress_bar import shown
     from o3d_relief.scene.arrays import MeshArrays, to_open3d
     from o3d_relief.scene.read import left_out, read_arrays
 
-    arrays = read_arrays(path)
+    with shown("reading"):
+        arrays = read_arrays(path)
     if isinstance(arrays, MeshArrays):
         tell(f"{path}: {len(arrays.vertices)} vertices, {len(arrays.faces)} triangles")
         for note in left_out(path, arrays):

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.pipeline import Relief
 from o3d_relief.plate_params import PlateParams
+from o3d_relief.progress import OnProgress, Progress
 from o3d_relief.solid.body import Solid
 from o3d_relief.solid.checks import SolidReport, check_solid
 from o3d_relief.solid.estimate import estimate_solid
@@ -55,6 +56,7 @@ def make_checked(
     mill: MillParams | None = None,
     undercut_free: bool = False,
     tiles: TileParams | None = None,
+    on_progress: OnProgress | None = None,
 ) -> Made:
     """Make a solid, mill and cut it as far as asked for, check it and tell what comes out.
 
@@ -66,14 +68,22 @@ def make_checked(
         Takes a line.
     mill, undercut_free, tiles
         See `work_on`.
+    on_progress : callable, optional
+        Called with "solid", "work" and "checks"; see `make_solid`.
 
     Returns
     -------
     Made
     """
-    work = work_on(make_solid(relief, plate), mill=mill, undercut_free=undercut_free, tiles=tiles)
+    progress = Progress(on_progress)
+    solid = make_solid(relief, plate, on_progress=on_progress)
+    progress.begin("work")
+    work = work_on(solid, mill=mill, undercut_free=undercut_free, tiles=tiles)
+    progress.end()
     solid = work.solid
+    progress.begin("checks")
     report = check_solid(solid, plate)
+    progress.end()
     x, y, z = report.size_mm
     tell(
         f"solid: {x:.2f} x {y:.2f} x {z:.2f} mm, {report.volume_mm3 / 1000.0:.1f} cm3, {report.triangles} "

@@ -17,6 +17,10 @@ Tick = Callable[[float | None], None]
 """What long loops call in each round, with the share that is done or None; it may raise `Cancelled`."""
 
 
+_NEARLY = 0.99
+"""A stage is done when it ends, and not before, whatever its loops think."""
+
+
 def silent(_share: float | None) -> None:
     """Tell nobody."""
 
@@ -67,10 +71,10 @@ class Progress:
         Parameters
         ----------
         share : float, optional
-            From 0 to 1; where omitted, the last one still holds.
+            From 0 to 1; where omitted, the last one still holds. Up to 0.99 is told.
         """
         if share is not None:
-            self._share = share if self._share is None else max(share, self._share)
+            self._share = max(min(share, _NEARLY), self._share or 0.0)
         self._tell()
 
     def end(self) -> None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from tqdm import tqdm
 
-__all__ = ["BatchBar", "StageBar", "on_terminal"]
+__all__ = ["BatchBar", "StageBar", "on_terminal", "shown"]
 
 _WITH_SHARE = "  {desc:<13}{percentage:3.0f}% |{bar:30}| {elapsed}"
 _WITHOUT = "  {desc:<13}  ... {elapsed}"
@@ -71,6 +72,22 @@ class StageBar:
         if self._bar is not None:
             self._bar.close()
             self._bar = None
+
+
+@contextmanager
+def shown(stage: str) -> Iterator[None]:
+    """Show, on a terminal, what is under way in a `with` statement.
+
+    Parameters
+    ----------
+    stage : str
+    """
+    bar = StageBar()
+    bar(stage, None)
+    try:
+        yield
+    finally:
+        bar.close()
 
 
 class BatchBar:

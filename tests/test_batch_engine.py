@@ -24,3 +24,37 @@ def test_an_engine_that_is_not_installed(monkeypatch, engine, module):
     sentence = rf"is not installed: pip install 'o3d-relief\[{engine}\]'"
     with pytest.raises(ReliefError, match=sentence), open_engine(engine, None, 2):
         pass
+
+
+@pytest.mark.parametrize("address", ["127.0.0.1:9", "ray://127.0.0.1:9"])
+def test_a_ray_cluster_that_is_not_there(address):
+    pytest.importorskip("ray")
+    with pytest.raises(ReliefError, match="does not answer"), open_engine("ray", address, None):
+        pass
+
+
+def test_a_cluster_without_workers_or_patience(monkeypatch):
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr("o3d_relief.batch_engine._PATIENCE", 0.5)
+    nobody = {"n_workers": 0, "dashboard_address": None, "processes": False}
+    with distributed.LocalCluster(**nobody) as cluster:
+        address = cluster.scheduler_address
+        with pytest.raises(ReliefError, match="has no workers"), open_engine("dask", address, None):
+            pass
+        cluster.scale(1)
+        cluster.scheduler.allowed_failures = 1
+        monkeypatch.setattr("o3d_relief.batch_engine._PATIENCE", 30)
+        sentence = "gives a task up after 1 lost workers, too early to tell"
+        with pytest.raises(ReliefError, match=sentence), open_engine("dask", address, None):
+            pass
+
+
+def test_a_cluster_that_is_not_there():
+    pytest.importorskip("distributed")  # has to be there before its settings are changed
+    dask = pytest.importorskip("dask")
+    with (
+        dask.config.set({"distributed.comm.timeouts.connect": "0.2s"}),
+        pytest.raises(ReliefError, match="does not answer, or has no workers"),
+        open_engine("dask", "tcp://127.0.0.1:9", None),
+    ):
+        pass

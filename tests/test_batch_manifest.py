@@ -73,6 +73,21 @@ def test_notes_count_what_was_begun(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_note_without_its_relief_is_no_entry(tmp_path, made):
+    Notes(tmp_path).keep(made)
+    (tmp_path / "relief.obj").write_bytes(b"old")  # killed just before it was replaced
+    assert Manifest(tmp_path).entries == {}
+
+
+def test_a_note_without_its_bytes_is_none(tmp_path):
+    notes = Notes(tmp_path)
+    notes.keep(failed("a"))
+    (note,) = tmp_path.rglob("*.json")
+    note.write_bytes(bytes(note.stat().st_size))
+    assert notes.entry("a") is None
+    assert notes.kept() == []
+
+
 def test_the_last_word_on_an_input_counts(tmp_path, made):
     manifest = Manifest(tmp_path)
     manifest.add(failed("x"))
@@ -84,7 +99,7 @@ def test_the_last_word_on_an_input_counts(tmp_path, made):
         file.write('{"input": "y", "outp')
     again = Manifest(tmp_path)
     assert again.entries == {"x": failed("x"), made.input: made, "y": failed("y")}
-    again.tidy([made.input, "y", "unknown"])
+    again.settle([made.input, "y", "unknown"])
     lines = (tmp_path / "manifest.jsonl").read_text().splitlines()
     assert [BatchEntry.from_line(line) for line in lines] == [made, failed("y"), failed("x")]
 

@@ -34,12 +34,14 @@ def stacked():
 @pytest.mark.parametrize(("depth", "long"), [(None, "order"), (20.0, "bounded")])
 def test_every_stage_is_told_from_its_beginning_to_its_end(depth, long):
     watcher = Watcher()
-    relief = rel.make_relief(stacked(), rel.ReliefParams(k=8, depth=depth), on_progress=watcher)
+    mesh = stacked() if depth is None else to_mesh(bust(10))
+    relief = rel.make_relief(mesh, rel.ReliefParams(k=8, depth=depth), on_progress=watcher)
     assert watcher.stages() == list(relief.stages)
     for stage in relief.stages:
         shares = watcher.shares(stage)
         assert shares[0] is None
         assert shares[-1] == 1.0
+        assert shares.count(1.0) == 1
         known = [share for share in shares if share is not None]
         assert known == sorted(known)
         assert all(0.0 <= share <= 1.0 for share in known)
@@ -91,6 +93,7 @@ def test_a_scan_comes_first():
     relief = rel.make_relief(cloud, rel.ReliefParams(k=8, in_order=False), on_progress=watcher)
     assert watcher.stages() == list(relief.stages)
     assert watcher.stages()[0] == "points"
+    assert len(watcher.shares("orientation")) > 20  # one for each direction from which the points are seen
     with pytest.raises(rel.Cancelled, match="in the stage surface"):
         rel.scan_points(cloud, on_progress=Watcher(stop_in="surface"))
 
@@ -105,8 +108,10 @@ def test_what_was_told_is_not_taken_back():
     progress.begin("order")
     for share in (0.3, None, 0.1, 0.6):
         progress.tick(share)
+    progress.tick(1.0)  # not done before its end
+    progress.end()
     progress.begin("trim")
-    assert watcher.told == [("order", s) for s in (None, 0.3, 0.3, 0.3, 0.6)] + [("trim", None)]
+    assert watcher.told == [("order", s) for s in (None, 0.3, 0.3, 0.3, 0.6, 0.99, 1.0)] + [("trim", None)]
 
 
 @pytest.mark.parametrize(
@@ -114,3 +119,13 @@ def test_what_was_told_is_not_taken_back():
 )
 def test_share_of_a_way_that_shrinks_by_factors(now, share):
     assert share_of_way(1000.0, now, 1.0) == pytest.approx(share)
+
+
+def test_a_solid_tells_and_can_be_called_off():
+    relief = rel.make_relief(to_mesh(bust(12)), rel.ReliefParams(k=8))
+    watcher = Watcher()
+    rel.make_solid(relief, on_progress=watcher)
+    assert watcher.stages() == ["solid"]
+    assert watcher.shares("solid")[-1] == 1.0
+    with pytest.raises(rel.Cancelled, match="in the stage solid"):
+        rel.make_solid(relief, on_progress=Watcher(stop_in="solid", after=2))

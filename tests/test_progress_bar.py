@@ -1,7 +1,9 @@
 import io
 import sys
 
-from o3d_relief.progress_bar import StageBar, on_terminal
+import pytest
+
+from o3d_relief.progress_bar import BatchBar, StageBar, on_terminal, shown
 
 
 class Terminal(io.StringIO):
@@ -53,3 +55,31 @@ def test_elsewhere_there_is_none(monkeypatch):
     monkeypatch.setattr(sys, "stderr", None)  # closed when the program was started
     StageBar()("order", 0.5)
     assert not on_terminal()
+
+
+def test_what_has_no_stages_is_shown_as_a_whole(monkeypatch):
+    terminal = watched(monkeypatch)
+
+    def fail():
+        with shown("reading"):
+            assert "reading" in terminal.getvalue().split("\r")[-1]
+            raise KeyError
+
+    with pytest.raises(KeyError):
+        fail()
+    assert terminal.getvalue().split("\r")[-1].strip() == ""
+
+
+def test_lines_are_written_above_the_bar_of_a_batch(monkeypatch):
+    terminal = watched(monkeypatch)
+    bar = BatchBar()
+    bar("batch", None)
+    assert terminal.getvalue() == ""
+    bar("batch", 0.25)
+    bar.write(lambda text: terminal.write(f"{text}\n"), "x.ply -> x.ply")
+    before, after = terminal.getvalue().split("x.ply -> x.ply\n")
+    assert before.split("\r")[-1] == ""  # the bar was taken away before
+    assert " 25% |" in before
+    assert " 25% |" in after
+    bar.close()
+    assert terminal.getvalue().split("\r")[-1].strip() == ""

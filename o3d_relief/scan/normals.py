@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from o3d_relief.progress import Tick, silent
 from o3d_relief.scan.neighbours import Neighbours
 
 __all__ = ["agreement", "check_normals", "estimate_normals"]
@@ -17,7 +18,11 @@ _ALONG = 0.7
 
 
 def estimate_normals(
-    points: NDArray[np.float64], neighbours: Neighbours, usable: NDArray[np.bool_]
+    points: NDArray[np.float64],
+    neighbours: Neighbours,
+    usable: NDArray[np.bool_],
+    *,
+    tick: Tick = silent,
 ) -> NDArray[np.float64]:
     """Estimate normals: the direction in which a point and its neighbours spread least.
 
@@ -28,6 +33,8 @@ def estimate_normals(
     neighbours : Neighbours
     usable : (n,) bool
         Points that count; the others are no neighbours and get the normal zero.
+    tick : callable, optional
+        Called with the share of the work that is done; it may raise to end the work.
 
     Returns
     -------
@@ -43,6 +50,7 @@ def estimate_normals(
     """
     normals = np.zeros_like(points)
     for start in range(0, len(points), _BLOCK):
+        tick(start / len(points))
         block = slice(start, start + _BLOCK)
         index = np.column_stack([np.arange(len(points))[block], neighbours.index[block]])
         weight = usable[index].astype(np.float64)

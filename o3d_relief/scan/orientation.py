@@ -8,6 +8,7 @@ import scipy.sparse.linalg as sla
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from o3d_relief.progress import Tick, silent
 from o3d_relief.scan.neighbours import thin
 
 __all__ = ["away_votes", "edge_agreement", "propagate", "towards"]
@@ -58,6 +59,7 @@ def away_votes(
     *,
     front: NDArray[np.float64],
     up: NDArray[np.float64],
+    tick: Tick = silent,
 ) -> NDArray[np.float64]:
     """Vote on each normal: whether the point is seen from the side to which it points.
 
@@ -75,6 +77,8 @@ def away_votes(
         In the unit of the points.
     front, up : (3,) float64
         Unit vectors towards the viewer and upwards.
+    tick : callable, optional
+        Called with the share of the work that is done; it may raise to end the work.
 
     Returns
     -------
@@ -87,7 +91,9 @@ def away_votes(
     around /= np.linalg.norm(around, axis=1, keepdims=True)
     views = [(direction, _AROUND / len(around)) for direction in around]
     votes = np.zeros(len(points))
-    for direction, share in [*views, (front, _FRONT), (up, _UP)]:
+    views += [(front, _FRONT), (up, _UP)]
+    for number, (direction, share) in enumerate(views):
+        tick(0.7 * number / len(views))  # the rest is for the propagation
         seen = _frontmost(points, direction, _CELL * spacing)
         votes[seen] += share * (normals[seen] @ direction)
     return votes

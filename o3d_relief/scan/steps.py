@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 from o3d_relief.errors import MeshError
 from o3d_relief.limits import check_points
 from o3d_relief.params import Triple, View
+from o3d_relief.progress import Tick, silent
 from o3d_relief.scan.ground import find_ground
 from o3d_relief.scan.neighbours import Neighbours, find_neighbours, local_spacings, outliers, thin
 from o3d_relief.scan.normals import agreement, check_normals, estimate_normals
@@ -158,10 +159,16 @@ def outliers_step(work: Work, params: ScanParams) -> OutliersStage:
 
 
 def normals_step(
-    work: Work, points: PointsStage, far: NDArray[np.bool_], cloud: CloudArrays, params: ScanParams
+    work: Work,
+    points: PointsStage,
+    far: NDArray[np.bool_],
+    cloud: CloudArrays,
+    params: ScanParams,
+    *,
+    tick: Tick = silent,
 ) -> NormalsStage:
     """Estimate the normals, or take the cloud's own where they agree with the estimated ones."""
-    estimated = estimate_normals(work.points, work.neighbours, ~far)
+    estimated = estimate_normals(work.points, work.neighbours, ~far, tick=tick)
     usable: NDArray[np.bool_] = np.asarray(estimated.any(axis=1))
     _check_enough(int(usable.sum()), f"{int(usable.sum())} points of the cloud that lie on a surface")
     counts = {"on_no_surface": int((~usable & ~far).sum()), "own": 0, "own_zero": 0, "own_off": 0}
@@ -203,7 +210,13 @@ def _unit(direction: Triple | str) -> NDArray[np.float64]:
 
 
 def orientation_step(
-    work: Work, normals: NormalsStage, ground: GroundStage, params: ScanParams, view: View
+    work: Work,
+    normals: NormalsStage,
+    ground: GroundStage,
+    params: ScanParams,
+    view: View,
+    *,
+    tick: Tick = silent,
 ) -> OrientationStage:
     """Turn the normals so that they point out of the surface."""
     used = np.flatnonzero(normals.normals.any(axis=1) & ~ground.ground)
@@ -213,7 +226,7 @@ def orientation_step(
         sensor = (np.array(params.sensor) - work.centre) / work.size
         method, turned = "sensor", towards(points, axes, sensor)
     else:
-        votes = away_votes(points, axes, spacing, front=_unit(view.front), up=_unit(view.up))
+        votes = away_votes(points, axes, spacing, front=_unit(view.front), up=_unit(view.up), tick=tick)
         sign = _own_sign(points, axes, votes) if normals.from_file else 0.0
         method = "cloud" if sign else "propagation"
         turned = sign * axes if sign else propagate(points, axes, votes, spacing)

@@ -114,11 +114,11 @@ def scan_points(
     journal.begin("outliers")
     outlier = journal.keep(outliers_step(work, params)).outlier
     journal.begin("normals")
-    normals = journal.keep(normals_step(work, points, outlier, arrays, params))
+    normals = journal.keep(normals_step(work, points, outlier, arrays, params, tick=journal.tick))
     journal.begin("ground")
     ground = journal.keep(ground_step(work, normals, params, view))
     journal.begin("orientation")
-    oriented = journal.keep(orientation_step(work, normals, ground, params, view))
+    oriented = journal.keep(orientation_step(work, normals, ground, params, view, tick=journal.tick))
     journal.begin("surface")
     surface = journal.keep(surface_step(work, oriented, params))
     journal.begin("skin")

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from o3d_relief.errors import MeshError, ParameterError
 from o3d_relief.pipeline import Relief
 from o3d_relief.plate_params import PlateParams
+from o3d_relief.progress import OnProgress, Progress, Tick, silent
 from o3d_relief.scene.arrays import MeshArrays, from_open3d
 from o3d_relief.solid.bodies import joined
 from o3d_relief.solid.body import Solid, manifold_of
@@ -35,7 +36,9 @@ _COLOR_MM = 0.8
 """Longest edge where a texture changes: colours of prints are not much finer."""
 
 
-def make_solid(relief: Relief, params: PlateParams | None = None) -> Solid:
+def make_solid(
+    relief: Relief, params: PlateParams | None = None, *, on_progress: OnProgress | None = None
+) -> Solid:
     """Make one closed body of a relief and a plate.
 
     The relief's surface stays as it is, scaled; where `depth_mm` asks for another depth than the relief
@@ -47,6 +50,9 @@ def make_solid(relief: Relief, params: PlateParams | None = None) -> Solid:
     relief : Relief
         Never modified.
     params : PlateParams, optional
+    on_progress : callable, optional
+        Called with "solid" and the share of the work that is done, None where that is not known. Where it
+        returns False, or raises, the work ends.
 
     Returns
     -------
@@ -59,6 +65,8 @@ def make_solid(relief: Relief, params: PlateParams | None = None) -> Solid:
         Nothing of the relief encloses a volume.
     ParameterError
         A plate too small for what it is to hang from.
+    Cancelled
+        `on_progress` returned False.
 
     Examples
     --------
@@ -72,10 +80,14 @@ def make_solid(relief: Relief, params: PlateParams | None = None) -> Solid:
     params = PlateParams() if params is None else params
     if not isinstance(params, PlateParams):
         raise ParameterError(f"params must be a PlateParams. Got {params!r} instead.")
-    return solid_of(from_open3d(relief.mesh), params)
+    progress = Progress(on_progress)
+    progress.begin("solid")
+    solid = solid_of(from_open3d(relief.mesh), params, tick=progress.tick)
+    progress.end()
+    return solid
 
 
-def solid_of(mesh: MeshArrays, params: PlateParams) -> Solid:
+def solid_of(mesh: MeshArrays, params: PlateParams, *, tick: Tick = silent) -> Solid:
     """Make one closed body of a surface in front of z = 0 and a plate; see `make_solid`.
 
     Parameters
@@ -83,17 +95,21 @@ def solid_of(mesh: MeshArrays, params: PlateParams) -> Solid:
     mesh : MeshArrays
         In any unit, cut at z = 0 exactly, seen from z+.
     params : PlateParams
+    tick : callable, optional
+        Called between the steps; it may raise to end the work.
     """
     width = float(np.ptp(mesh.vertices[mesh.faces.ravel(), 0]))
     mesh = refined_for_texture(mesh, _COLOR_MM * width / params.width_mm)
     vertices, depth_ratio = to_millimetres(mesh.vertices, mesh.faces, params)
     colors = surface_colors(mesh)
+    tick(0.2)
     parts = closed_parts(vertices, mesh.faces, floor=-params.embed_mm, thickness=params.thickness_mm)
     if not parts.pieces:
         raise MeshError("Nothing of the relief encloses a volume: there is nothing to print.")
     # Once, but where what was furthest out turns out to be loose, or a crumb, and is left out.
     wide = deep = 1.0
     for _ in range(_ATTEMPTS):
+        tick(0.5)
         pieces = fitted(parts.pieces, params, wide=wide, deep=deep)
         whole, settled = joined(_on_plate(pieces, colors, params), params)
         wider, deeper = shortfall(whole.bounding_box(), params)
@@ -101,6 +117,7 @@ def solid_of(mesh: MeshArrays, params: PlateParams) -> Solid:
             break
         wide, deep = wide * wider, deep * deeper
     depth_ratio *= deep / wide
+    tick(0.8)
     result = Solid.from_manifold(whole, colored=colors is not None)
     counts = {f"parts_{name}": count for name, count in parts.counts.items()}
     return replace(result, counts={"depth_ratio": depth_ratio, **counts, **settled})
