@@ -14,12 +14,12 @@ import time
 from collections.abc import Callable
 
 import open3d as o3d
-from refined import refined
 
 import o3d_relief as rel
 from o3d_relief.live_construction import LiveConstruction
 from o3d_relief.live_scene import LivePoints, LiveScene
 from o3d_relief.stages.construction import construct
+from refined import refined
 
 SIZES = (35_000, 134_000, 250_000, 1_000_000)
 CHANGES = ("alpha", "beta", "t1", "t2", "edit", "brush", "undo")

@@ -15,26 +15,30 @@ RED, BLUE = (0.85, 0.2, 0.15), (0.15, 0.35, 0.8)
 
 def main(scene: str | None = None, output: str = "figure_10.png", panel: int = 460, k: int = 64) -> None:
     mesh = rel.read_mesh(scene) if scene else rel.demo_scene()
-    centers = rel.make_relief(mesh, rel.ReliefParams(k=k)).stages["clusters"].centers
+    editor = rel.ReliefEditor(mesh, rel.ReliefParams(k=k))
+    placed = type(mesh)(mesh).transform(np.linalg.inv(editor.to_scene))
     pictures = []
     for side in (1.0, -1.0):
-        beta = np.where(side * centers[:, 0] > 0.0, 0.03, 0.8)
-        relief = rel.make_relief(mesh, rel.ReliefParams(k=k, beta=beta.tolist()))
-        points = relief.stages["attenuation"]
-        unit = relief.stages["scene"].unit
-        placed = type(mesh)(mesh).transform(np.linalg.inv(relief.to_scene))
+        near = side * editor.points.position[:, 0] > 0.0
+        editor.edit(np.flatnonzero(near), beta=0.03)
+        editor.edit(np.flatnonzero(~near), beta=0.8)
+        points, relief = editor.points, editor.relief()
         colors = np.where(points.beta[:, None] < 0.1, RED, BLUE)
         legend = [(RED, "beta = 0.03"), (BLUE, "beta = 0.8")]
         size = panel, panel
-        places = relief.stages["scene"].vertices[points.index] * unit
         pictures.append(
             rel.render(
-                placed, points=places, point_colors=colors, point_radius=panel / 90, legend=legend, size=size
+                placed,
+                points=points.position,
+                point_colors=colors,
+                point_radius=panel / 90,
+                legend=legend,
+                size=size,
             )
         )
         for yaw in (-50, 50):
             pictures.append(rel.render(relief.mesh, direction=rel.view_direction(yaw), plate=True, size=size))
-        depth = relief.summary()["relief_depth"] / unit
+        depth = relief.summary()["relief_depth"] / editor.unit
         print(f"beta = 0.03 on the {'right' if side > 0 else 'left'}: depth {depth:.1f}")
     rel.save_png(output, rel.contact_sheet(pictures, 3))
 

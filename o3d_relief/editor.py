@@ -223,7 +223,7 @@ class ReliefEditor:
 
     def edit(
         self,
-        points: int | Sequence[int],
+        points: int | Sequence[int] | NDArray[np.integer[Any]],
         *,
         action: str | None = None,
         beta: float | None = None,
@@ -258,7 +258,7 @@ class ReliefEditor:
             result.append(merged(vertex, [*own, PointEdit(vertex=vertex, action=action, beta=beta)]))
         self.change(point_edits=result, continued=continued)
 
-    def clear(self, points: int | Sequence[int]) -> None:
+    def clear(self, points: int | Sequence[int] | NDArray[np.integer[Any]]) -> None:
         """Take back what was changed of single points by hand.
 
         Parameters
@@ -271,7 +271,9 @@ class ReliefEditor:
         concerned = live.edited(edits)
         self.change(point_edits=[edit for edit, i in zip(edits, concerned, strict=True) if i not in chosen])
 
-    def _numbers(self, points: int | Sequence[int]) -> tuple[LivePoints, list[int]]:
+    def _numbers(
+        self, points: int | Sequence[int] | NDArray[np.integer[Any]]
+    ) -> tuple[LivePoints, list[int]]:
         """Check numbers of points."""
         if self._live is None or self._points is None:
             raise ParameterError("The bounded mode has no attenuation points to edit.")

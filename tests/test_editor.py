@@ -3,7 +3,16 @@ import open3d as o3d
 import pytest
 import scipy.sparse.linalg as sla
 
-from o3d_relief import MeshError, ParameterError, PointEdit, ReliefEditor, ReliefParams, View, make_relief
+from o3d_relief import (
+    MeshError,
+    ParameterError,
+    PointEdit,
+    ReliefEditor,
+    ReliefParams,
+    View,
+    make_relief,
+    read_mesh,
+)
 from o3d_relief.stages.compression import compress
 from shapes import bust, exploded, hills, joined, moved, sphere, to_mesh
 
@@ -269,3 +278,14 @@ def test_no_factorisation_where_the_points_stay(editor, monkeypatch):
     assert 0 < max(sizes) <= K  # Eq. 5, among the points
     editor.change(seed=2)
     assert max(sizes) > len(editor.heights) / 2
+
+
+@pytest.mark.data
+def test_a_scene_of_many_parts(data_folder):
+    mesh = read_mesh(data_folder / "scene_japanese_temple.obj")
+    editor = ReliefEditor(mesh, ReliefParams(k=64, beta=0.1))
+    editor.change(beta=0.4)
+    _assert_right(editor, mesh)
+    editor.change(discard_above=0.35)  # other parts than before hold a point
+    editor.edit(range(0, len(editor.points.beta), 5), action="scale", beta=0.05)
+    _assert_right(editor, mesh)
