@@ -79,6 +79,14 @@ class Screen:
         assert done.returncode == 0, done.stderr
         return done.stdout
 
+    def click(self, window: int, place: tuple[int, int]) -> None:
+        """Click with the left mouse button, as slowly as a hand."""
+        self.do("mousemove", "--window", window, *place)
+        time.sleep(0.8)
+        self.do("mousedown", 1)
+        time.sleep(1.0)
+        self.do("mouseup", 1)
+
     def drag(self, window: int, start: tuple[int, int], end: tuple[int, int]) -> None:
         """Drag with the left mouse button, as slowly as a hand."""
         self.do("mousemove", "--window", window, *start)

@@ -84,8 +84,8 @@ class EditorPanel:
     def _add_history(self) -> None:
         studio = self._studio
         self._row(
-            ("Undo", lambda: studio.ask("undo", lambda editor, _: editor.undo())),
-            ("Redo", lambda: studio.ask("redo", lambda editor, _: editor.redo())),
+            ("Undo", studio.undo),
+            ("Redo", studio.redo),
             ("Reset", lambda: studio.ask("reset", lambda editor, _: editor.reset())),
         )
         self._row(("Save relief", lambda: self._on_file("relief")))

@@ -59,6 +59,7 @@ class EditorWindow:
         self._output = output
         self.chosen: list[int] = []
         self._brush, self._radius = False, 8.0
+        self._control = False
         self._pressed: tuple[int, int] | None = None
         self._version = -1
         self._synced = False
@@ -79,6 +80,7 @@ class EditorWindow:
         self._window.set_on_layout(self._layout)
         self._window.set_on_close(self._close)
         self._window.set_on_tick_event(self._tick)
+        self._window.set_on_key(self._key)
         self._result: tuple[ReliefParams, View] | None = None
 
     def run(self) -> tuple[ReliefParams, View] | None:
@@ -134,6 +136,24 @@ class EditorWindow:
 
     def _close(self) -> bool:
         self._result = self.studio.close()
+        return True
+
+    def _key(self, event: Any) -> bool:
+        """Undo, redo and close by the keys that do it everywhere."""
+        names = gui.KeyName
+        if event.type == gui.KeyEvent.DOWN and event.key in (names.LEFT_CONTROL, names.RIGHT_CONTROL):
+            self._control = True
+        elif event.type == gui.KeyEvent.UP and event.key in (names.LEFT_CONTROL, names.RIGHT_CONTROL):
+            self._control = False
+        elif event.type == gui.KeyEvent.DOWN and self._control and event.key in (names.Z, names.Y):
+            if event.key == names.Z:
+                self.studio.undo()
+            else:
+                self.studio.redo()
+        elif event.type == gui.KeyEvent.DOWN and self._control and event.key == names.Q:
+            self._window.close()
+        else:
+            return False
         return True
 
     # The mouse.
