@@ -22,11 +22,11 @@ import o3d_relief as rel
 
 mesh = rel.read_mesh("scene.ply")
 params = PARAMS
-params, view = rel.edit(mesh, params, output="relief.ply", size=(900, 860))
+params, view = rel.edit(mesh, params, output="relief.ply", size=(700, 800))
 save_params("params.json", params, view)
 """
 # Where the widgets are, in pixels of the window.
-WIDTH = 900
+WIDTH = 700
 PANEL = WIDTH - 336
 BETA, T1 = 167, 271
 SAVE, ATTACH = (PANEL + 40, 37), (PANEL + 41, 609)
@@ -110,7 +110,7 @@ def test_sliders_points_and_files(screen, editor, tmp_path):
     assert changed(scene, wide) < 0.9
 
     # The middle of the relief: the point next to it turns white, and its name is told.
-    screen.click(eye.window, (PANEL // 2, 430))
+    screen.click(eye.window, (PANEL // 2, 400))
     chosen, named = eye.wait(lambda now, _: changed(wide, now) > 0.0002)
     assert changed(wide, chosen) < 0.02
     assert changed(panel[500:600], named[500:600]) > 0.002
