@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING
 
@@ -45,6 +47,10 @@ if TYPE_CHECKING:
     from o3d_relief.solid.milling import milled
     from o3d_relief.solid.tiles import make_tiles
     from o3d_relief.workshop_params import MillParams, TileParams
+
+if "ipykernel" in sys.modules:
+    # In a notebook Open3D opens connections to public servers as soon as it is imported; "false" allows it.
+    os.environ.setdefault("OPEN3D_DISABLE_WEB_VISUALIZER", "true")
 
 __version__ = "0.1.0"
 

@@ -91,6 +91,12 @@ class Relief:
             f"{depth:.4g} deep, stages {', '.join(self.stages)}>"
         )
 
+    def _repr_png_(self) -> bytes:
+        """Show the relief in a notebook: a sheet of views."""
+        from o3d_relief.show.notebook import relief_png  # drawing is not needed to make a relief
+
+        return relief_png(self)
+
     @cached_property
     def certificate(self) -> Certificate:
         """Test what the relief keeps of its scene, on its mesh; done when it is first asked for."""

@@ -57,17 +57,18 @@ class Screen:
     def settled(
         self, seconds: float = 90.0, other_than: NDArray[np.uint8] | None = None
     ) -> NDArray[np.uint8]:
-        """Return what is on the screen as soon as nothing moves any more, once it is another picture."""
+        """Return what is on the screen as soon as nothing moves for a while, once it is another picture."""
         end = time.monotonic() + seconds
-        last = self.picture() if other_than is None else other_than
+        last, still = self.picture(), 0
         moved = other_than is None
         while time.monotonic() < end:
-            time.sleep(0.4)
+            time.sleep(0.25)
             now = self.picture()
-            same = np.array_equal(now, last)
-            if same and moved:
+            still = still + 1 if np.array_equal(now, last) else 0
+            moved = moved or not np.array_equal(now, other_than)
+            if moved and still >= 4:
                 return now
-            moved, last = moved or not same, now
+            last = now
         raise AssertionError("the picture does not come to rest" if moved else "the picture does not change")
 
     def do(self, *words: object) -> str:
@@ -79,16 +80,20 @@ class Screen:
         assert done.returncode == 0, done.stderr
         return done.stdout
 
+    def click(self, window: int, place: tuple[int, int]) -> None:
+        """Click with the left mouse button; the window gets the time to see each movement."""
+        self.drag(window, place, place)
+
     def drag(self, window: int, start: tuple[int, int], end: tuple[int, int]) -> None:
-        """Drag with the left mouse button, as slowly as a hand."""
+        """Drag with the left mouse button."""
         self.do("mousemove", "--window", window, *start)
-        time.sleep(0.5)
+        self.settled()
         self.do("mousedown", 1)
-        for part in (0.25, 0.5, 0.75, 1.0):
-            time.sleep(0.5)
+        self.settled()
+        for part in (0.5, 1.0) if end != start else ():
             place = (round(a + part * (b - a)) for a, b in zip(start, end, strict=True))
             self.do("mousemove", "--window", window, *place)
-        time.sleep(0.5)
+            self.settled()
         self.do("mouseup", 1)
 
     def window(self, title: str, seconds: float = 120.0) -> int:

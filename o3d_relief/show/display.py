@@ -51,8 +51,8 @@ def require_vulkan() -> None:
         return
     if not _vulkan_starts():
         raise DisplayError(
-            "The editor's window needs a Vulkan driver: install that of the graphics card or, to draw without "
-            "one, Debian's libvulkan1 and chromium-common with "
+            "The editor's window needs a Vulkan driver: install that of the graphics card or, to draw "
+            "without one, Debian's libvulkan1 and chromium-common with "
             "VK_ICD_FILENAMES=/usr/lib/chromium/vk_swiftshader_icd.json."
         )
 

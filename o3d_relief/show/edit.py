@@ -19,7 +19,7 @@ from o3d_relief.scene.arrays import from_open3d
 from o3d_relief.scene.convert import mesh_arrays
 from o3d_relief.scene.write import check_writable
 from o3d_relief.show.display import require_display, require_vulkan
-from o3d_relief.show.editor_process import EditorOpening
+from o3d_relief.show.messages import EditorOpening
 
 if TYPE_CHECKING:
     import open3d as o3d
@@ -35,6 +35,7 @@ def edit(
     output: str | Path | None = None,
     size_mm: float = 150.0,
     title: str = "o3d-relief edit",
+    size: tuple[int, int] = (1280, 860),
 ) -> tuple[ReliefParams, View]:
     """Edit a relief in a window, until it is closed.
 
@@ -50,6 +51,8 @@ def edit(
         Length of the relief's larger side in millimetres, for the slider of the depth.
     title : str
         Of the window.
+    size : (width, height)
+        Of the window, in pixels.
 
     Returns
     -------
@@ -86,6 +89,7 @@ def edit(
             output=place,
             size_mm=float(size_mm),
             title=title,
+            size=size,
             result=result,
         )
         code, words = _run(opening)
@@ -93,7 +97,7 @@ def edit(
             return load_params(result)
     if code == 2:
         raise ReliefError(words)
-    raise DisplayError(f"The editor's window ended with an error (exit code {code}).")
+    raise DisplayError(f"The editor's window broke (exit code {code}): {words}")
 
 
 def _run(opening: EditorOpening) -> tuple[int, str]:

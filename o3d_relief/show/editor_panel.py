@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -11,27 +10,22 @@ from typing import Any
 
 from open3d.visualization import gui
 
-from o3d_relief.params import ReliefParams
+from o3d_relief.params import ReliefParams, View
 from o3d_relief.show.editor_asks import MODES, Scale, mode_of, mode_values
+from o3d_relief.show.editor_column import Column
 from o3d_relief.show.sight import Sight, Work
 from o3d_relief.show.studio import Studio
 
 __all__ = ["EditorPanel"]
 
-_LIMITS = {
-    "k": (1.0, 512.0),
-    "beta": (0.0, 1.0),
-    "alpha": (0.05, 1.0),
-    "discard_above": (0.0, 1.0),
-    "attach_below": (0.0, 1.0),
+_SLIDERS = {
+    "k": ("k, attenuation points", (1.0, 512.0)),
+    "beta": ("beta, attenuation factor", (0.0, 1.0)),
+    "alpha": ("alpha, compression (1: none)", (0.05, 1.0)),
+    "discard_above": ("t1: discard above", (0.0, 1.0)),
+    "attach_below": ("t2: attach below", (0.0, 1.0)),
 }
-_LABELS = {
-    "k": "k, attenuation points",
-    "beta": "beta, attenuation factor",
-    "alpha": "alpha, compression (1: none)",
-    "discard_above": "t1: discard above",
-    "attach_below": "t2: attach below",
-}
+_RADIUS = 8.0  # of the brush, in relief units
 
 
 class EditorPanel:
@@ -68,11 +62,10 @@ class EditorPanel:
     ) -> None:
         self._studio, self._size_mm, self._chosen = studio, size_mm, chosen
         self._on_tool, self._on_file = on_tool, on_file
-        self._sliders: dict[str, Any] = {}
-        self._was_set: dict[str, float] = {}
         self._scale: Scale | None = None
-        space = round(0.25 * em)
-        self.widget = gui.ScrollableVert(space, gui.Margins(round(0.7 * em)))
+        self._view: View | None = None
+        self._column = Column(em)
+        self.widget = self._column.widget
         self._add_history()
         self._add_parameters()
         self._add_view()
@@ -82,94 +75,51 @@ class EditorPanel:
     # The widgets, from the top down.
 
     def _add_history(self) -> None:
-        studio = self._studio
-        self._row(
-            ("Undo", lambda: studio.ask("undo", lambda editor, _: editor.undo())),
-            ("Redo", lambda: studio.ask("redo", lambda editor, _: editor.redo())),
-            ("Reset", lambda: studio.ask("reset", lambda editor, _: editor.reset())),
-        )
-        self._row(("Save relief", lambda: self._on_file("relief")))
-        self._row(("Save parameters", lambda: self._on_file("save")), ("Load", lambda: self._on_file("load")))
+        studio, row = self._studio, self._column.row
+        reset = ("Reset", lambda: studio.ask("reset", lambda editor, _: editor.reset()))
+        row(("Undo", studio.undo), ("Redo", studio.redo), reset)
+        row(("Save relief", lambda: self._on_file("relief")))
+        row(("Save parameters", lambda: self._on_file("save")), ("Load", lambda: self._on_file("load")))
 
     def _add_parameters(self) -> None:
-        for name, text in _LABELS.items():
-            kind = gui.Slider.INT if name == "k" else gui.Slider.DOUBLE
-            self._slider(name, text, kind, _LIMITS[name], self._asker(name))
+        for name, (text, limits) in _SLIDERS.items():
+            self._column.slider(name, text, limits, self._asker(name), whole=name == "k")
         self._mode = gui.Combobox()
         for text in MODES.values():
             self._mode.add_item(text)
         self._mode.set_on_selection_changed(lambda _text, _index: self._ask_mode())
-        self._labelled("mode", self._mode)
-        self._slider("depth", "depth, mm", gui.Slider.DOUBLE, (0.5, 100.0), lambda _value: self._ask_mode())
-        self._finishing = gui.Checkbox("restoration and guarantees")
-        self._finishing.checked = True
-        self._finishing.set_on_checked(lambda on: self._studio.finish(wanted=on))
-        self.widget.add_child(self._finishing)
+        self._column.add(self._mode, "mode")
+        self._column.slider("depth", "depth, mm", (0.5, 100.0), self._ask_depth)
+        self._column.check("restoration and guarantees", lambda on: self._studio.finish(wanted=on), on=True)
 
     def _add_view(self) -> None:
-        self._vanishing = gui.Checkbox("vanishing point (x, y, z < 0)")
-        self._vanishing.set_on_checked(lambda _on: self._ask_vanishing())
-        self.widget.add_child(self._vanishing)
-        self._vanishing_at = gui.VectorEdit()
+        self._vanishing = self._column.check(
+            "vanishing point (x, y, z < 0)", lambda _on: self._ask_vanishing()
+        )
+        self._vanishing_at = self._column.add(gui.VectorEdit())
         self._vanishing_at.vector_value = [0.0, 0.0, -300.0]
         self._vanishing_at.set_on_value_changed(lambda _value: self._ask_vanishing())
-        self.widget.add_child(self._vanishing_at)
 
     def _add_points(self) -> None:
-        self._picked = gui.Label("no point is chosen: click one")
-        self.widget.add_child(self._picked)
-        self._slider("own", "its own beta", gui.Slider.DOUBLE, _LIMITS["beta"], self._edit_beta)
-        self._row(
+        column = self._column
+        self._picked = column.add(gui.Label("no point is chosen: click one"))
+        column.slider("own", "its own beta", (0.0, 1.0), self._edit_beta)
+        column.row(
             ("Attach", lambda: self._edit("attach")),
             ("Release", lambda: self._edit("scale")),
             ("Discard", lambda: self._edit("discard")),
             ("As before", self._clear),
         )
-        self._brush = gui.Checkbox("brush: drag over several points")
-        self._brush.set_on_checked(lambda _on: self._tell_tool())
-        self.widget.add_child(self._brush)
-        self._slider("radius", "its radius", gui.Slider.DOUBLE, (1.0, 30.0), lambda _value: self._tell_tool())
-        self._set("radius", 8.0)
+        self._brush = column.check("brush: drag over several points", lambda _on: self._tell_tool())
+        column.slider("radius", "its radius", (1.0, 30.0), lambda _value: self._tell_tool())
+        column.set("radius", _RADIUS)
 
     def _add_status(self) -> None:
-        self._bar = gui.ProgressBar()
-        self.widget.add_child(self._bar)
-        self._row(("Cancel", self._studio.cancel))
-        self._doing = gui.Label("")
-        self._sentence = gui.Label("")
+        self._bar = self._column.add(gui.ProgressBar())
+        self._column.row(("Cancel", self._studio.cancel))
+        self._doing = self._column.add(gui.Label(""))
+        self._sentence = self._column.add(gui.Label(""))
         self._sentence.text_color = gui.Color(0.95, 0.45, 0.35)
-        self.widget.add_child(self._doing)
-        self.widget.add_child(self._sentence)
-
-    def _row(self, *buttons: tuple[str, Callable[[], None]]) -> None:
-        row = gui.Horiz(4)
-        for text, act in buttons:
-            button = gui.Button(text)
-            button.horizontal_padding_em, button.vertical_padding_em = 0.4, 0.05
-            button.set_on_clicked(act)
-            row.add_child(button)
-        self.widget.add_child(row)
-
-    def _labelled(self, text: str, widget: Any) -> None:
-        self.widget.add_child(gui.Label(text))
-        self.widget.add_child(widget)
-
-    def _slider(
-        self, name: str, text: str, kind: Any, limits: tuple[float, float], act: Callable[[float], None]
-    ) -> None:
-        def moved(value: float) -> None:
-            # Open3D tells of values that the program has set, too: rounded to 32 bits they are others.
-            if self._scale is None and name != "radius":  # nothing is shown yet
-                return
-            if abs(value - self._was_set.get(name, math.inf)) > 1e-6 * max(1.0, abs(value)):
-                self._was_set.pop(name, None)
-                act(round(value, 4))
-
-        slider = gui.Slider(kind)
-        slider.set_limits(*limits)
-        slider.set_on_value_changed(moved)
-        self._sliders[name] = slider
-        self._labelled(text, slider)
 
     # What they ask for.
 
@@ -182,17 +132,25 @@ class EditorPanel:
 
         return ask
 
+    def _chosen_mode(self) -> str:
+        return list(MODES)[int(self._mode.selected_index)]
+
+    def _ask_depth(self, _value: float) -> None:
+        if self._chosen_mode() != "alpha":
+            self._ask_mode()
+
     def _ask_mode(self) -> None:
-        if self._scale is None:
-            return
-        mode = list(MODES)[self._mode.selected_index]
-        depth = self._scale.to_input(self._sliders["depth"].double_value)
-        self._studio.change(
-            "mode", slow=True, **mode_values(mode, depth, self._sliders["alpha"].double_value)
-        )
+        if self._scale is not None:
+            depth = self._scale.to_input(self._column.value("depth"))
+            values = mode_values(self._chosen_mode(), depth, self._column.value("alpha"))
+            self._studio.change("mode", slow=True, **values)
 
     def _ask_vanishing(self) -> None:
-        point = tuple(float(c) for c in self._vanishing_at.vector_value) if self._vanishing.checked else None
+        point: Any = None
+        if self._vanishing.checked:
+            point = tuple(round(float(c), 4) for c in self._vanishing_at.vector_value)
+        if self._view is None or point == self._view.vanishing_point:
+            return  # set by the program
 
         def act(editor: Any, continued: bool) -> None:
             editor.change(view=replace(editor.view, vanishing_point=point), continued=continued)
@@ -218,63 +176,7 @@ class EditorPanel:
             self._studio.ask("clear", lambda editor, _: editor.clear(points))
 
     def _tell_tool(self) -> None:
-        self._on_tool(self._brush.checked, self._sliders["radius"].double_value)
-
-    # What they show.
-
-    def show(self, sight: Sight) -> None:
-        """Set everything to the parameters of a surface."""
-        params = sight.params
-        self._scale = Scale(unit=sight.unit, size_mm=self._size_mm)
-        self._set("k", params.k)
-        self._set(
-            "beta", params.beta if isinstance(params.beta, float) else sum(params.beta) / len(params.beta)
-        )
-        self._set("alpha", 1.0 if params.alpha is None else params.alpha)
-        self._set("discard_above", params.discard_above)
-        self._set("attach_below", params.attach_below)
-        self._mode.selected_index = list(MODES).index(mode_of(params))
-        deepest = max(float(sight.scene_depth), 1e-9)
-        self._sliders["depth"].set_limits(0.02 * self._scale.to_mm(deepest), self._scale.to_mm(deepest))
-        depth = deepest if params.depth is None else params.depth
-        self._set("depth", self._scale.to_mm(depth))
-        self._enable(params)
-        self._vanishing.checked = sight.view.vanishing_point is not None
-        if sight.view.vanishing_point is not None:
-            self._vanishing_at.vector_value = list(sight.view.vanishing_point)
-
-    def show_choice(self, sight: Sight, chosen: Sequence[int]) -> None:
-        """Show which points are chosen."""
-        if not chosen:
-            self._picked.text = "no point is chosen: click one"
-            return
-        actions = sorted({str(sight.points.action[number]) for number in chosen})
-        what = f"point {chosen[0]}" if len(chosen) == 1 else f"{len(chosen)} points"
-        self._picked.text = f"{what}: {', '.join(actions)}"
-        self._set("own", float(sight.points.beta[chosen[-1]]))
-
-    def show_work(self, work: Work, *, final: bool) -> None:
-        """Show what goes on."""
-        self._bar.value = 0.0 if not work.doing else (0.05 if work.share is None else work.share)
-        share = "" if work.share is None else f", {100.0 * work.share:.0f} %"
-        rest = "the finished relief" if final else "a preview"
-        self._doing.text = f"computing: {work.doing}{share}" if work.doing else rest
-        self._sentence.text = _lines(work.sentence)
-
-    def _enable(self, params: ReliefParams) -> None:
-        mode = mode_of(params)
-        self._sliders["alpha"].enabled = mode == "alpha"
-        self._sliders["depth"].enabled = True
-        for name in ("k", "beta", "discard_above", "attach_below"):
-            self._sliders[name].enabled = not params.bounded
-
-    def _set(self, name: str, value: float) -> None:
-        slider = self._sliders[name]
-        self._was_set[name] = value
-        if name == "k":
-            slider.int_value = round(value)
-        else:
-            slider.double_value = float(value)
+        self._on_tool(self._brush.checked, self._column.value("radius"))
 
     def ask_file(self, kind: str, path: Path) -> None:
         """Ask for what is to be done with a file that was chosen."""
@@ -285,6 +187,47 @@ class EditorPanel:
         else:
             self._studio.ask("load", lambda editor, _: editor.load(path), doing="the parameters of the file")
 
+    # What they show.
 
-def _lines(text: str, width: int = 40) -> str:
-    return "\n".join(textwrap.wrap(text, width))
+    def show(self, sight: Sight) -> None:
+        """Set everything to the parameters of a surface."""
+        params, column = sight.params, self._column
+        self._scale, self._view = Scale(unit=sight.unit, size_mm=self._size_mm), sight.view
+        beta = params.beta if isinstance(params.beta, float) else sum(params.beta) / len(params.beta)
+        column.set("k", params.k)
+        column.set("beta", beta)
+        column.set("alpha", 1.0 if params.alpha is None else params.alpha)
+        column.set("discard_above", params.discard_above)
+        column.set("attach_below", params.attach_below)
+        self._mode.selected_index = list(MODES).index(mode_of(params))
+        deepest = self._scale.to_mm(sight.scene_depth)
+        depth = deepest if params.depth is None else self._scale.to_mm(params.depth)
+        column.set("depth", depth, (0.01 * deepest, max(deepest, depth)))
+        self._enable(params)
+        point = sight.view.vanishing_point
+        self._vanishing.checked = point is not None
+        if point is not None:
+            self._vanishing_at.vector_value = list(point)
+
+    def _enable(self, params: ReliefParams) -> None:
+        self._column.enable("alpha", on=mode_of(params) == "alpha")
+        for name in ("k", "beta", "discard_above", "attach_below"):
+            self._column.enable(name, on=not params.bounded)
+
+    def show_choice(self, sight: Sight, chosen: Sequence[int]) -> None:
+        """Show which points are chosen."""
+        if not chosen:
+            self._picked.text = "no point is chosen: click one"
+            return
+        actions = sorted({str(sight.points.action[number]) for number in chosen})
+        what = f"point {chosen[0]}" if len(chosen) == 1 else f"{len(chosen)} points"
+        self._picked.text = f"{what}: {', '.join(actions)}"
+        self._column.set("own", float(sight.points.beta[chosen[-1]]))
+
+    def show_work(self, work: Work, *, final: bool) -> None:
+        """Show what goes on."""
+        self._bar.value = 0.0 if not work.doing else (0.05 if work.share is None else work.share)
+        share = "" if work.share is None else f", {100.0 * work.share:.0f} %"
+        rest = "the finished relief" if final else "a preview"
+        self._doing.text = f"computing: {work.doing}{share}" if work.doing else rest
+        self._sentence.text = "\n".join(textwrap.wrap(work.sentence, 40))

@@ -10,44 +10,13 @@ import pickle
 import signal
 import sys
 import threading
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from o3d_relief.console import tell
-from o3d_relief.params import ReliefParams, View
 from o3d_relief.params_file import save_params
-from o3d_relief.scene.arrays import MeshArrays
+from o3d_relief.show.messages import EditorOpening
 
-__all__ = ["EditorOpening", "main"]
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class EditorOpening:
-    """What the process is told.
-
-    Attributes
-    ----------
-    scene : MeshArrays
-    params : ReliefParams
-    view : View
-    output : Path or None
-        Where "Save relief" writes to.
-    size_mm : float
-        Length of the relief's larger side in millimetres.
-    title : str
-        Of the window.
-    result : Path
-        The parameter file to leave behind.
-    """
-
-    scene: MeshArrays
-    params: ReliefParams
-    view: View
-    output: Path | None
-    size_mm: float
-    title: str
-    result: Path
+__all__ = ["main"]
 
 
 def main() -> int:
@@ -76,6 +45,7 @@ def main() -> int:
         output=opening.output,
         size_mm=opening.size_mm,
         title=opening.title,
+        size=opening.size,
     )
     threading.Thread(target=_follow, args=(window,), daemon=True).start()
     end = window.run()

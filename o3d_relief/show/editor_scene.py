@@ -20,6 +20,7 @@ from o3d_relief.show.stage_panels import ACTIONS
 __all__ = ["EditorScene", "nearest_point", "points_within"]
 
 _BALL = 1.3  # relief units
+_FIELD = 30.0  # degrees
 _CHOSEN = (1.0, 1.0, 1.0)
 _BACKGROUND = [0.87, 0.87, 0.865, 1.0]
 
@@ -40,6 +41,7 @@ class EditorScene:
     def __init__(self, renderer: Any) -> None:
         self.widget = gui.SceneWidget()
         self.widget.scene = rendering.Open3DScene(renderer)
+        self.widget.enable_scene_caching(True)  # a slider that moves does not draw the scene anew
         self.widget.scene.set_background(_BACKGROUND)
         self.widget.scene.show_skybox(False)
         # Light from the upper left, as in the pictures; shadows would cost a software renderer seconds.
@@ -76,11 +78,14 @@ class EditorScene:
     def front(self) -> None:
         """Look at the relief from the front."""
         low, high = self._shown.min(axis=0), self._shown.max(axis=0)
+        middle, (width, height, depth) = (low + high) / 2, high - low
+        frame = self.widget.frame
+        aspect = frame.width / frame.height if frame.width > 0 and frame.height > 0 else 1.0
+        half = np.tan(np.deg2rad(_FIELD / 2.0))
+        away = 0.58 * max(height, width / aspect) / half + 0.5 * depth
         box = o3d.geometry.AxisAlignedBoundingBox(low, high)
-        middle = (low + high) / 2
-        self.widget.setup_camera(30.0, box, middle.astype(np.float32))
-        away = middle + np.array([0.0, 0.0, 0.95 * float(np.linalg.norm(high - low)) / np.tan(np.pi / 6)])
-        self.widget.look_at(middle, away, np.array([0.0, 1.0, 0.0]))
+        self.widget.setup_camera(_FIELD, box, middle.astype(np.float32))
+        self.widget.look_at(middle, middle + np.array([0.0, 0.0, away]), np.array([0.0, 1.0, 0.0]))
         self.widget.center_of_rotation = middle
 
     def place_under(self, x: float, y: float) -> NDArray[np.float64] | None:

@@ -59,9 +59,11 @@ class EditorWindow:
         self._output = output
         self.chosen: list[int] = []
         self._brush, self._radius = False, 8.0
+        self._control = False
         self._pressed: tuple[int, int] | None = None
         self._version = -1
         self._synced = False
+        self._said = ""
         self._scene = EditorScene(self._window.renderer)
         self._scene.widget.set_on_mouse(self._mouse)
         self._news = False
@@ -79,6 +81,7 @@ class EditorWindow:
         self._window.set_on_layout(self._layout)
         self._window.set_on_close(self._close)
         self._window.set_on_tick_event(self._tick)
+        self._window.set_on_key(self._key)
         self._result: tuple[ReliefParams, View] | None = None
 
     def run(self) -> tuple[ReliefParams, View] | None:
@@ -118,6 +121,8 @@ class EditorWindow:
             self.chosen = [number for number in self.chosen if number < len(sight.points.vertex)]
             self._scene.show(sight, self.chosen)
             self._synced = False
+        if work.sentence != self._said:  # a slider that has asked too much goes back
+            self._said, self._synced = work.sentence, False
         if sight is not None and not self._synced and not self.studio.waiting:
             self._panel.show(sight)  # not in the middle of a drag
             self._panel.show_choice(sight, self.chosen)
@@ -134,6 +139,24 @@ class EditorWindow:
 
     def _close(self) -> bool:
         self._result = self.studio.close()
+        return True
+
+    def _key(self, event: Any) -> bool:
+        """Undo, redo and close by the keys that do it everywhere."""
+        names = gui.KeyName
+        if event.type == gui.KeyEvent.Type.DOWN and event.key in (names.LEFT_CONTROL, names.RIGHT_CONTROL):
+            self._control = True
+        elif event.type == gui.KeyEvent.Type.UP and event.key in (names.LEFT_CONTROL, names.RIGHT_CONTROL):
+            self._control = False
+        elif event.type == gui.KeyEvent.Type.DOWN and self._control and event.key in (names.Z, names.Y):
+            if event.key == names.Z:
+                self.studio.undo()
+            else:
+                self.studio.redo()
+        elif event.type == gui.KeyEvent.Type.DOWN and self._control and event.key == names.Q:
+            self._window.close()
+        else:
+            return False
         return True
 
     # The mouse.

@@ -1,15 +1,17 @@
-"""What a run tells the process of the stage viewer, beside its records."""
+"""What the processes of the windows are told, beside the records of the stages."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from o3d_relief.params import Triple
+from o3d_relief.params import ReliefParams, Triple, View
+from o3d_relief.scene.arrays import MeshArrays
 
-__all__ = ["Done", "Opening"]
+__all__ = ["Done", "EditorOpening", "Opening"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -37,3 +39,34 @@ class Opening:
 @dataclass(frozen=True)
 class Done:
     """The last message: the window stays open though nothing more will come."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class EditorOpening:
+    """All that the process of the live editor is told.
+
+    Attributes
+    ----------
+    scene : MeshArrays
+    params : ReliefParams
+    view : View
+    output : Path or None
+        Where "Save relief" writes to.
+    size_mm : float
+        Length of the relief's larger side in millimetres.
+    title : str
+        Of the window.
+    size : (width, height)
+        Of the window, in pixels.
+    result : Path
+        The parameter file to leave behind.
+    """
+
+    scene: MeshArrays
+    params: ReliefParams
+    view: View
+    output: Path | None
+    size_mm: float
+    title: str
+    size: tuple[int, int]
+    result: Path

@@ -7,6 +7,7 @@ import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -77,6 +78,7 @@ class Studio:
         self._change = threading.Condition()
         self._requests: list[_Request] = []
         self._last = ("", 0.0)
+        self._number = count()
         self._called_off = self._closed = False
         self._relief: Relief | None = None
         self._editor: ReliefEditor | None = None
@@ -123,6 +125,14 @@ class Studio:
             doing=_OPENING if slow else "",
             delay=0.4 if slow else 0.0,
         )
+
+    def undo(self) -> None:
+        """Ask for the state before the last change."""
+        self.ask(f"undo {next(self._number)}", lambda editor, _continued: editor.undo())  # none is dropped
+
+    def redo(self) -> None:
+        """Ask for the change that was taken back last."""
+        self.ask(f"redo {next(self._number)}", lambda editor, _continued: editor.redo())
 
     def save_relief(self, path: Path) -> None:
         """Ask for the relief in a file."""

@@ -4,9 +4,9 @@ import sys
 import numpy as np
 import open3d as o3d
 import pytest
-import quality
 from PIL import Image
 
+import quality
 from shapes import bust, grid, to_mesh
 
 
