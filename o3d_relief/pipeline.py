@@ -20,6 +20,7 @@ from o3d_relief.linalg.laplacian import cotangent_laplacian
 from o3d_relief.output import trimmed_mesh
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.records import StageRecord, TrimStage, final_heights
+from o3d_relief.restoration_step import restoration_step
 from o3d_relief.scan_params import ScanParams
 from o3d_relief.scene.convert import mesh_arrays
 from o3d_relief.scene.scan import scan_points
@@ -33,7 +34,6 @@ from o3d_relief.steps import (
     frame_step,
     order_step,
     perspective_step,
-    restoration_step,
     scene_step,
     stacked_pairs,
     trim_step,
@@ -232,8 +232,12 @@ def make_relief(
         z = journal.keep(
             construction_step(vertices, faces, visible, laplacian, slivers, clusters, points, pairs)
         ).z
-        z = journal.keep(restoration_step(vertices, visible, laplacian, z, clusters, points, params)).z
-        z = journal.keep(order_step(vertices, faces, visible, laplacian, z, pairs, params, scene.unit)).z
+        restored = journal.keep(
+            restoration_step(vertices, faces, visible, laplacian, z, clusters, points, params)
+        )
+        z = journal.keep(
+            order_step(vertices, faces, visible, laplacian, restored, points, pairs, params, scene.unit)
+        ).z
         z = journal.keep(compression_step(z, params, scene.unit)).z
 
     out_faces, turned = turned_to_viewer(in_faces, scene, vertices, visible, laplacian)
