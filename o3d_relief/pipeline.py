@@ -22,6 +22,7 @@ from o3d_relief.output import trimmed_mesh
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.progress import OnProgress
 from o3d_relief.records import StageRecord, TrimStage, final_heights
+from o3d_relief.restoration_step import restoration_step
 from o3d_relief.scan_params import ScanParams
 from o3d_relief.scene.convert import mesh_arrays
 from o3d_relief.scene.scan import scan_points
@@ -34,7 +35,6 @@ from o3d_relief.steps import (
     frame_step,
     order_step,
     perspective_step,
-    restoration_step,
     scene_step,
     stacked_pairs,
     trim_step,
@@ -255,13 +255,25 @@ def make_relief(
             )
         ).z
         journal.begin("restoration")
-        z = journal.keep(
-            restoration_step(vertices, visible, laplacian, z, clusters, points, params, tick=journal.tick)
-        ).z
+        restored = journal.keep(
+            restoration_step(
+                vertices, faces, visible, laplacian, z, clusters, points, params, tick=journal.tick
+            )
+        )
         journal.begin("order")
-        z = journal.keep(
-            order_step(vertices, faces, visible, laplacian, z, pairs, params, scene.unit, tick=journal.tick)
-        ).z
+        ordered = order_step(
+            vertices,
+            faces,
+            visible,
+            laplacian,
+            restored,
+            points,
+            pairs,
+            params,
+            scene.unit,
+            tick=journal.tick,
+        )
+        z = journal.keep(ordered).z
         journal.begin("compression")
         z = journal.keep(compression_step(z, params, scene.unit)).z
 

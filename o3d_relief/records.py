@@ -208,12 +208,15 @@ class RestorationStage(StageRecord):
         Depth order error in [0, 1], 0 outside every neighbourhood.
     solved : (n,) bool
         The vertices that were solved again.
+    stiffness : float
+        By how much stiffer than elsewhere the surface was taken to be at the attenuation points.
     z : (n,) float64
     """
 
     name: ClassVar[str] = "restoration"
     order_error: NDArray[np.float64]
     solved: NDArray[np.bool_]
+    stiffness: float = 0.0
     z: NDArray[np.float64]
 
 

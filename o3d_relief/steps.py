@@ -10,9 +10,12 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from o3d_relief.attenuation_step import beta_of_clusters
+from o3d_relief.bounds.crossings import crossing_pairs
 from o3d_relief.bounds.order import keep_order
 from o3d_relief.bounds.pairs import Pairs, grid_pairs, vertex_pairs
 from o3d_relief.bounds.parts import tie_parts
+from o3d_relief.bounds.silhouettes import silhouette_pairs
+from o3d_relief.bounds.stiffness import Stiffness
 from o3d_relief.errors import MeshError, ParameterError
 from o3d_relief.linalg.laplacian import vertex_areas
 from o3d_relief.params import ReliefParams, Triple, View
@@ -35,24 +38,15 @@ from o3d_relief.stages.attenuation import attenuate
 from o3d_relief.stages.clustering import cluster_vertices
 from o3d_relief.stages.compression import alpha_for_depth, compress
 from o3d_relief.stages.construction import construct
-from o3d_relief.stages.floor import lowest_heights
-from o3d_relief.stages.order_errors import (
-    cluster_radii,
-    lift_loose,
-    lifting_discs,
-    order_errors,
-    smoothing_discs,
-)
 from o3d_relief.stages.perspective import forced_perspective
-from o3d_relief.stages.restoration import restore
 from o3d_relief.stages.trim import Trimmed, trim_behind
 from o3d_relief.stages.visibility import turned_away, visible_vertices
 
-_KEPT_ON_PLANE = 0.2
-"""Share of its height above its surroundings that what is visible keeps where it would be pressed onto S."""
-
 _OUT_OF_SHAPE = 1e3
 """A forced perspective that makes the scene larger or smaller by more than this leaves nothing of it."""
+
+_LINES = 256
+"""Lines along x and along y on which the order is kept, besides those through vertices and crossings."""
 
 _ON_PLANE = 1e-9
 """Heights within this of S, in relief units, lie on it: rounding errors leave no slivers at the cut."""
@@ -193,49 +187,13 @@ def construction_step(
     return ConstructionStage(z=built.z, counts=counts)
 
 
-def restoration_step(
-    vertices: NDArray[np.float64],
-    visible: NDArray[np.bool_],
-    laplacian: sp.csr_array,
-    z: NDArray[np.float64],
-    clusters: ClustersStage,
-    points: AttenuationStage,
-    params: ReliefParams,
-    *,
-    tick: Tick = silent,
-) -> RestorationStage:
-    """Find order errors and pimples, and what is visible behind S, and mend them."""
-    _, label = connected_components(laplacian, directed=False)
-    index = points.kept_index
-    if params.in_front:
-        z = lift_loose(z, label, index, visible)
-    own_cluster = clusters.labels[index]
-    radii = cluster_radii(vertices[:, :2], clusters.labels, len(clusters.centers))[own_cluster]
-    error = order_errors(vertices, z, index, radii)
-    high = error >= params.max_order_error
-    counts = {"high_errors": int(high.sum())}
-    if params.smooth_points:
-        high |= smoothing_discs(vertices, index, radii)
-    if params.in_front:
-        high |= lifting_discs(vertices, z, label, visible)
-    floor = lowest_heights(vertices, visible, share=_KEPT_ON_PLANE) if params.in_front else None
-    restored = restore(vertices, laplacian, z, high, index, label, blend=params.blend, floor=floor, tick=tick)
-    counts |= {
-        "solved": int(restored.solved.sum()),
-        "points_held": restored.points_held,
-        "set_on_floor": restored.set_on_floor,
-        "rounds": restored.rounds,
-        "visible_behind": _behind(restored.z, visible),
-    }
-    return RestorationStage(order_error=error, solved=restored.solved, z=restored.z, counts=counts)
-
-
 def order_step(
     vertices: NDArray[np.float64],
     faces: NDArray[np.int64],
     visible: NDArray[np.bool_],
     laplacian: sp.csr_array,
-    z: NDArray[np.float64],
+    restored: RestorationStage,
+    points: AttenuationStage,
     pairs: Pairs | None,
     params: ReliefParams,
     unit: float,
@@ -243,8 +201,12 @@ def order_step(
     tick: Tick = silent,
 ) -> OrderStage:
     """Keep everything in order along the viewing direction."""
+    z = restored.z
     if pairs is None:
         return OrderStage(z=on_plane(z))
+    if restored.stiffness > 0.0:
+        stiff = Stiffness(vertices, faces, points.kept_index)
+        laplacian = stiff.added_to(laplacian, restored.stiffness)
     # The compression comes later and shrinks gaps, at most by its smallest ratio.
     ratio, lowest = _ratios(z, params, unit)
     min_gap = params.min_gap / unit / (0.95 * lowest if ratio < 1.0 else 1.0)
@@ -254,7 +216,7 @@ def order_step(
         laplacian,
         vertex_areas(vertices, faces),
         z,
-        Pairs.join([pairs, grid_pairs(vertices, faces)]),
+        Pairs.join([pairs, _further_pairs(vertices, faces, min_gap)]),
         in_front=visible if params.in_front else None,
         min_gap=min_gap,
         tick=tick,
@@ -266,6 +228,15 @@ def order_step(
         "visible_behind": _behind(ordered.z, visible),
     }
     return OrderStage(z=on_plane(ordered.z), counts=counts)
+
+
+def _further_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64], min_gap: float) -> Pairs:
+    """Pair what is stacked elsewhere than at vertices, and what crosses already.
+
+    For a smallest gap, which need not be least at vertices and silhouettes, the grid is a fine one.
+    """
+    grid = grid_pairs(vertices, faces, side=_LINES if min_gap == 0.0 else 4 * _LINES)
+    return Pairs.join([silhouette_pairs(vertices, faces), crossing_pairs(vertices, faces), grid])
 
 
 def on_plane(z: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -145,9 +145,8 @@ def certify(
     met = crossings(relief, relief_faces, edges)
     met = met.select(met.pierced(relief[:, 2]))
     old = met.pierced(relief_before) | origin.crossed(met.edge[:, [0, 1, 1]], met.face)
-    near, elsewhere = normal_changes(
-        scene, np.column_stack([scene[:, :2], heights]), scene_faces, visible, points
-    )
+    after = np.column_stack([scene[:, :2], heights])
+    near, elsewhere = normal_changes(scene, after, scene_faces, visible, points)
     return Certificate(
         visible_tested=int(visible.sum()),
         visible_behind=int((heights[visible] < 0.0).sum()),

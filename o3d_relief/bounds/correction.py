@@ -20,6 +20,9 @@ _REACH = 4.0
 _SHORTEST, _LONGEST = 1.5, 8.0
 """The same in relief units, at least and at most."""
 
+_AROUND, _FURTHEST = 2.0, 32.0
+"""What lies further from what is new than this many reaches, four times as many and so on, stays as it is."""
+
 _REGION = 3.0
 """What lies further from every correction than this many reaches is not touched, unless it is in the way."""
 
@@ -65,8 +68,8 @@ class Correction:
     ) -> NDArray[np.float64]:
         """Find the heights that keep the gaps wanted, and what is in front of S there.
 
-        Corrections that hang together neither by the surface nor by pairs are programmes of their own:
-        those in which nothing is new stay as they are.
+        Corrections fade out: those far from what is new stay as they are, unless they are in the way. So do
+        those that hang together with it neither by the surface nor by pairs.
 
         Parameters
         ----------
@@ -94,37 +97,67 @@ class Correction:
             [pairs.difference(len(self._z)), sp.eye_array(len(self._z), format="csr")[floor]], format="csr"
         )
         least = np.concatenate([missing, lift[floor]])
+        reach = self._reaches(pairs, missing, lift)
+        wide = _AROUND if self._correction.any() else np.inf
         while True:
-            reach = self._reaches(pairs, missing, lift)
-            free = np.flatnonzero((reach > 0.0) & self._concerned(reach, rows, new | (reach != self._reach)))
-            own_rows = np.diff(rows[:, free].indptr) > 0
-            form = self._laplacian[free][:, free] + sp.diags_array(self._areas[free] / reach[free] ** 2)
-            correction = minimise(form, np.zeros(len(free)), rows[own_rows][:, free], least[own_rows])
+            free = np.flatnonzero(self._concerned(reach, rows, new, wide))
+            correction = self._minimum(free, reach[free], rows, least)
             if correction is not None:
                 break
+            if np.isfinite(wide):
+                wide = wide * 4.0 if wide < _FURTHEST else np.inf  # what is held around leaves no room
+                continue
             if (reach > 0.0).all():
                 raise SolverError(
                     f"The order of {len(pairs)} pairs of surfaces could not be restored; the mesh is likely "
                     "broken near very thin triangles: repair it, or give in_order=False."
                 )
             self._widening *= 2.0  # what lies around the region leaves no room
-        self._reach = reach
+            reach = self._reaches(pairs, missing, lift)
         self._correction[free] = correction
         return np.asarray(self._z + self._correction)
 
+    def _minimum(
+        self,
+        free: NDArray[np.int64],
+        reach: NDArray[np.float64],
+        rows: sp.csr_array,
+        least: NDArray[np.float64],
+    ) -> NDArray[np.float64] | None:
+        """Solve for the corrections of some vertices, the others held; None where there are none."""
+        others = self._correction.copy()
+        others[free] = 0.0
+        columns = rows[:, free]
+        own = np.diff(columns.indptr) > 0
+        form = self._laplacian[free]
+        return minimise(
+            form[:, free] + sp.diags_array(self._areas[free] / reach**2),
+            -(form @ others),
+            columns[own],
+            (least - rows @ others)[own],
+        )
+
     def _concerned(
-        self, reach: NDArray[np.float64], rows: sp.csr_array, touched: NDArray[np.bool_]
+        self, reach: NDArray[np.float64], rows: sp.csr_array, new: NDArray[np.bool_], wide: float
     ) -> NDArray[np.bool_]:
-        """Find the vertices whose corrections hang together with those of the vertices touched."""
-        free = np.flatnonzero(reach > 0.0)
-        coupling = rows[:, free]
-        graph = self._laplacian[free][:, free] + coupling.T @ coupling
+        """Find the vertices whose corrections hang together with what is new, and not too far from it."""
+        free = reach > 0.0
+        if np.isfinite(wide):
+            start = np.flatnonzero(new)
+            distance, nearest = cKDTree(self._vertices[start]).query(
+                self._vertices, distance_upper_bound=wide * reach[start].max()
+            )
+            near = np.flatnonzero(np.isfinite(distance))
+            free[near] &= distance[near] <= wide * reach[start][nearest[near]]
+            free[~np.isfinite(distance)] = False
+        numbers = np.flatnonzero(free)
+        coupling = rows[:, numbers]
+        graph = self._laplacian[numbers][:, numbers] + coupling.T @ coupling
         count, label = connected_components(graph, directed=False)
         wanted = np.zeros(count, dtype=bool)
-        wanted[label[touched[free]]] = True
-        concerned = np.zeros(len(reach), dtype=bool)
-        concerned[free] = wanted[label]
-        return concerned
+        wanted[label[new[numbers]]] = True
+        free[numbers] = wanted[label]
+        return free
 
     def _reaches(
         self,

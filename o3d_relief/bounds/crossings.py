@@ -6,16 +6,26 @@ from dataclasses import dataclass
 
 import numpy as np
 import open3d as o3d
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from o3d_relief.bounds.pairs import Pairs
 from o3d_relief.rays import unit_box
 
-__all__ = ["Crossings", "crossings", "edges_of"]
+__all__ = ["Crossings", "around", "crossing_pairs", "crossings", "edges_of", "new_crossings"]
 
 _DEEP = 1e-3
 """An edge pierces a triangle where it reaches at least this far, in relief units, to both of its sides and,
 seen from the front, away from its border: less is what float32 rays cannot tell from contact."""
+
+_FEW = 500
+"""So many crossings at most are looked at together with what is next to them."""
+
+_CLOSE = 0.02
+"""Gap in relief units below which surfaces next to a crossing are about to cross, too."""
+
+_HELD = 0.05
+"""Distance in relief units, seen from the front, by which the place of a crossing may move."""
 
 _INSIDE = 1e-4
 """Share at both ends of an edge that does not count as crossing: there it meets its neighbours."""
@@ -108,6 +118,82 @@ class Crossings:
         )
 
 
+def new_crossings(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    edges: NDArray[np.int64],
+    z: NDArray[np.float64],
+) -> tuple[Pairs, int]:
+    """Find the edges that pierce a triangle in front of S now, and did not before.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+        Before.
+    faces : (m, 3) int64
+    edges : (e, 2) int64
+    z : (n,) float64
+        Heights now.
+
+    Returns
+    -------
+    pairs : Pairs
+        Two for each of them, in the order of before, and those next to them that are about to follow.
+    count : int
+        Number of crossings.
+    """
+    before = vertices[:, 2]
+    found = crossings(np.column_stack([vertices[:, :2], z]), faces, edges)
+    new = found.pierced(z) & ~found.pierced(before)
+    new &= (z[found.face].max(axis=1) > 0.0) & (z[found.edge].max(axis=1) > 0.0)
+    found = found.select(new)
+    pairs = found.pairs(before, z)
+    if not 0 < len(found) <= _FEW:
+        return pairs, len(found)
+    beside = around(found, vertices, faces)
+    beside = beside.select(~beside.pierced(before) & (np.abs(beside.gaps(before)).max(axis=1) > _DEEP))
+    close = beside.pairs(before, z)
+    gap = np.subtract(*close.heights(z))
+    return Pairs.join([pairs, close.select(gap < np.minimum(_CLOSE, close.gap / 4.0))]), len(found)
+
+
+def crossing_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Pairs:
+    """Pair what crosses already, a little to both sides of each crossing, so that it stays where it is.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+        In relief units.
+    faces : (m, 3) int64
+
+    Returns
+    -------
+    Pairs
+    """
+    z = vertices[:, 2]
+    found = crossings(vertices, faces, edges_of(faces))
+    found = found.select(found.pierced(z))
+    gap = found.gaps(z)
+    share = gap[:, :1] / (gap[:, :1] - gap[:, 1:])  # of the stretch, where the edge meets the triangle
+    length = np.linalg.norm(vertices[found.edge[:, 1], :2] - vertices[found.edge[:, 0], :2], axis=1)
+    begin, stretch = found.along[:, :1], np.diff(found.along, axis=1)
+    side = _HELD / np.maximum(length[:, None] * stretch, _HELD)
+    sides = np.clip(share + side * [-1.0, 1.0], 0.0, 1.0)
+    inside = found.inside[:, :1] + sides[:, :, None] * np.diff(found.inside, axis=1)
+    corners = np.repeat(found.edge[:, [0, 1, 1]], 2, axis=0), np.repeat(found.face, 2, axis=0)
+    along = (begin + sides * stretch).ravel()
+    weights = np.stack([1.0 - along, along, np.zeros_like(along)], axis=1), inside.reshape(-1, 3)
+    gap = (gap[:, :1] + sides * np.diff(gap, axis=1)).ravel()
+    edge_above = (gap > 0.0)[:, None]
+    return Pairs(
+        upper=np.where(edge_above, *corners),
+        upper_weights=np.where(edge_above, *weights),
+        lower=np.where(edge_above, *corners[::-1]),
+        lower_weights=np.where(edge_above, *weights[::-1]),
+        gap=np.abs(gap),
+    )
+
+
 def edges_of(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return the edges of a mesh, (e, 2), each once, by their vertices in rising order."""
     low, high = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1).T
@@ -177,3 +263,35 @@ def _stretches(plane: NDArray[np.float64], edge: NDArray[np.int64], face: NDArra
 
 def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+
+
+def around(found: Crossings, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Crossings:
+    """Return the edges near crossings, each with the triangles near its crossing that lie above or below it.
+
+    What is kept apart at one edge likes to cross at the next: they belong together.
+
+    Parameters
+    ----------
+    found : Crossings
+    vertices : (n, 3) float64
+    faces : (m, 3) int64
+
+    Returns
+    -------
+    Crossings
+        Among the edges of all triangles that share a vertex with one of the two, and the triangles that
+        share a vertex with the other.
+    """
+    entries = np.ones(faces.size, dtype=bool), (faces.ravel(), np.repeat(np.arange(len(faces)), 3))
+    beside = sp.csr_array(entries, shape=(len(vertices), len(faces)))
+    edges, others = [np.zeros((0, 2), dtype=np.int64)], [np.zeros((0, 3), dtype=np.int64)]
+    for edge, face in zip(found.edge, found.face, strict=True):
+        at_edge, at_face = (faces[np.unique(beside[corners].indices)] for corners in (edge, face))
+        for one, other in ((at_edge, at_face), (at_face, at_edge)):
+            own = edges_of(one)
+            edges.append(np.repeat(own, len(other), axis=0))
+            others.append(np.tile(other, (len(own), 1)))
+    edge, face = np.concatenate(edges), np.concatenate(others)
+    apart = (edge[:, :, None] != face[:, None, :]).all(axis=(1, 2))
+    both = np.unique(np.concatenate([edge[apart], face[apart]], axis=1), axis=0)
+    return _stretches(vertices[:, :2], both[:, :2], both[:, 2:])

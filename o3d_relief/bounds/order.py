@@ -9,11 +9,11 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from o3d_relief.bounds.correction import Correction
-from o3d_relief.bounds.crossings import crossings, edges_of
+from o3d_relief.bounds.crossings import edges_of, new_crossings
 from o3d_relief.bounds.pairs import Pairs, foot_pairs
 from o3d_relief.progress import Tick, share_of_way, silent
 
-__all__ = ["Ordered", "keep_order", "out_of_order"]
+__all__ = ["Ordered", "keep_order", "out_of_order", "worst_of_stacks"]
 
 _MARGIN = 0.05
 """Pairs are set this far beyond their smallest gap, or a quarter of what they have, if that is less."""
@@ -96,8 +96,8 @@ def keep_order(
     minimise  e' C e + sum of A_i e_i^2 / reach^2   subject to  gap + R (z + e - z_0) >= required gap
     for every pair, and z_i + e_i >= 0 for the vertices in front. The original scene fulfils every
     inequality, so there is always a solution. Few of them bind: in each round those that are violated
-    join the ones held so far, one for each two triangles above each other, and the programme is solved
-    again. Edges that pierce triangles, between the lines, add pairs of their own.
+    join the ones held so far, one for each two triangles above each other, and what lies around them is
+    solved again. Edges that pierce triangles, between the lines, add pairs of their own.
 
     Parameters
     ----------
@@ -130,16 +130,17 @@ def keep_order(
     """
     front = np.zeros(len(z), dtype=bool) if in_front is None else in_front
     system = Correction(vertices, laplacian, areas, z)
-    near = faces
-    held, floor = np.zeros(len(pairs), dtype=bool), np.zeros(len(z), dtype=bool)
+    lines = _Lines(pairs, len(z), min_gap)
+    between, floor = Pairs.join([]), np.zeros(len(z), dtype=bool)
     current, best, fewest, rounds, first = z, z, np.inf, 0, 0
+    near = faces
     while True:
-        wrong = out_of_order(pairs, current, min_gap=min_gap)
+        lines.look_at(current)
         behind = front & (current < 0.0)
         edges = edges_of(near)
-        crossing = _new_crossings(vertices, near, edges, current)
+        crossing, crossed = new_crossings(vertices, near, edges, current)
         at_foot = foot_pairs(vertices, near, edges, current)
-        left = int(wrong.sum() + behind.sum()) + len(crossing) // 2 + len(at_foot)
+        left = int(lines.wrong.sum() + behind.sum()) + crossed + len(at_foot)
         first = first or left
         tick(share_of_way(first + 1.0, left + 1.0, 1.0))
         if left < fewest:
@@ -147,24 +148,57 @@ def keep_order(
         if left == 0 or rounds == _ROUNDS:
             break
         if rounds < _FORGETFUL:
-            held[held] = ~_spare(pairs.select(held), current, min_gap)
-        before = held.copy()
-        held |= _worst_of_stacks(pairs, current, wrong, min_gap)
-        pairs = Pairs.join([pairs, crossing, at_foot])
-        held = np.append(held, np.ones(len(pairs) - len(held), dtype=bool))
-        new = held.copy()
-        new[: len(before)] &= ~before
+            lines.let_go(current)
+            between = between.select(~_spare(between, current, min_gap))
+        new = lines.take_worst(current)
         touched = behind & ~floor
-        for corners in (pairs.upper[new], pairs.lower[new]):
-            touched[corners] = True
+        for found in (new, crossing, at_foot):
+            touched[found.upper] = True
+            touched[found.lower] = True
+        between = Pairs.join([between, crossing, at_foot])
         floor |= behind
-        chosen = pairs.select(held)
+        chosen = Pairs.join([lines.held, between])
         last = current
         current = system.solve(chosen, _wanted_gaps(chosen, min_gap), floor, touched)
         current = np.where(floor, np.maximum(current, 0.0), current)
         near = faces[_over_or_under(vertices, faces, current != last)]
         rounds += 1
-    return Ordered(z=best, rounds=rounds, corrected_pairs=int(held.sum() + floor.sum()), left=int(fewest))
+    held = len(lines.held) + len(between) + int(floor.sum())
+    return Ordered(z=best, rounds=rounds, corrected_pairs=held, left=int(fewest))
+
+
+class _Lines:
+    """The pairs on lines that are known beforehand: which are wrong, and which are held."""
+
+    def __init__(self, pairs: Pairs, n: int, min_gap: float) -> None:
+        self._pairs, self._min_gap = pairs, min_gap
+        self._held = np.zeros(len(pairs), dtype=bool)
+        self._last = np.full(n, np.nan)
+        self.wrong = np.zeros(len(pairs), dtype=bool)
+
+    @property
+    def held(self) -> Pairs:
+        return self._pairs.select(self._held)
+
+    def look_at(self, z: NDArray[np.float64]) -> None:
+        """Find what is wrong now; only pairs of which a vertex has moved can have changed."""
+        moved = z != self._last
+        self._last = z
+        changed = np.flatnonzero(moved[self._pairs.upper].any(axis=1) | moved[self._pairs.lower].any(axis=1))
+        self.wrong[changed] = out_of_order(self._pairs.select(changed), z, min_gap=self._min_gap)
+
+    def let_go(self, z: NDArray[np.float64]) -> None:
+        """Hold no longer what has room to spare."""
+        self._held[self._held] = ~_spare(self.held, z, self._min_gap)
+
+    def take_worst(self, z: NDArray[np.float64]) -> Pairs:
+        """Hold the worst of the wrong pairs, too; return those that were not held before."""
+        lacking = np.zeros(len(self._pairs))
+        wrong = self._pairs.select(self.wrong)
+        lacking[self.wrong] = required_gaps(wrong, self._min_gap) - np.subtract(*wrong.heights(z))
+        new = worst_of_stacks(self._pairs, lacking, self.wrong) & ~self._held
+        self._held |= new
+        return self._pairs.select(new)
 
 
 def _over_or_under(
@@ -192,19 +226,6 @@ def _over_or_under(
     return np.asarray(within > 0)
 
 
-def _new_crossings(
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    edges: NDArray[np.int64],
-    z: NDArray[np.float64],
-) -> Pairs:
-    """Return two pairs for each edge that pierces a triangle in front of S now, and did not."""
-    found = crossings(np.column_stack([vertices[:, :2], z]), faces, edges)
-    new = found.pierced(z) & ~found.pierced(vertices[:, 2])
-    new &= (z[found.face].max(axis=1) > 0.0) & (z[found.edge].max(axis=1) > 0.0)
-    return found.select(new).pairs(vertices[:, 2], z)
-
-
 def _wanted_gaps(pairs: Pairs, min_gap: float) -> NDArray[np.float64]:
     """Return the gap that pairs are set to: a little more than they must keep, and less than they had."""
     required = required_gaps(pairs, min_gap)
@@ -217,18 +238,26 @@ def _spare(pairs: Pairs, z: NDArray[np.float64], min_gap: float) -> NDArray[np.b
     return np.asarray(upper - lower > _wanted_gaps(pairs, min_gap) + _SLACK)
 
 
-def _worst_of_stacks(
-    pairs: Pairs, z: NDArray[np.float64], wrong: NDArray[np.bool_], min_gap: float
+def worst_of_stacks(
+    pairs: Pairs, lacking: NDArray[np.float64], wrong: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     """Find, of each two triangles above each other, the wrong pair that lacks most of what it must keep.
 
     A gap is linear over two triangles: hundreds of grid lines through them say hardly more than one.
+
+    Parameters
+    ----------
+    pairs : Pairs
+    lacking : (p,) float64
+    wrong : (p,) bool
+
+    Returns
+    -------
+    (p,) bool
     """
     among = pairs.select(wrong)
-    upper, lower = among.heights(z)
-    lacking = required_gaps(among, min_gap) - (upper - lower)
     stack = np.concatenate([among.upper, among.lower], axis=1)
-    order = np.lexsort((-lacking, *stack.T))
+    order = np.lexsort((-lacking[wrong], *stack.T))
     first = np.ones(len(order), dtype=bool)
     first[1:] = (stack[order][1:] != stack[order][:-1]).any(axis=1)
     worst = np.zeros(len(pairs), dtype=bool)

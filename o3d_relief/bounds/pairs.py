@@ -59,8 +59,8 @@ class Pairs:
             np.einsum("pc,pc->p", z[self.lower], self.lower_weights),
         )
 
-    def select(self, chosen: NDArray[np.bool_]) -> Pairs:
-        """Return some of the pairs."""
+    def select(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Pairs:
+        """Return some of the pairs, by a mask or by number."""
         return Pairs(
             upper=self.upper[chosen],
             upper_weights=self.upper_weights[chosen],

@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 __all__ = ["minimise"]
 
 _TOLERANCE = 1e-6
+_MISSED = 1e-3
+"""By how much inequalities may be missed: "almost solved" can be far off."""
+
 _FOUND = (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved)
 
 
@@ -63,9 +66,10 @@ def minimise(
         settings,
     )
     solution = solver.solve()
-    if solution.status not in _FOUND:
+    found = np.array(solution.x, dtype=np.float64)
+    if solution.status not in _FOUND or (len(least) and (least - rows @ found).max() > _MISSED):
         return None
-    return np.array(solution.x, dtype=np.float64)
+    return found
 
 
 def _columns(matrix: sp.sparray) -> sp.csc_matrix:

@@ -1,0 +1,191 @@
+"""Silhouettes, and what is stacked where they cross in the picture."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o3d_relief.bounds.crossings import edges_of
+from o3d_relief.bounds.pairs import Pairs
+
+__all__ = ["silhouette_pairs", "silhouettes"]
+
+_FEWEST_CELLS, _MOST_CELLS = 128, 4096
+"""Raster, along the longer side, in whose cells edges that may cross are looked up: one for each edge."""
+
+_CLEAR = 1e-3
+"""Edges cross in the picture where each reaches this far beyond the other, in relief units."""
+
+_APART = 5e-4
+"""Smallest gap in relief units: edges that touch are in no order."""
+
+_CORNERS = np.array([[1, 2, 0], [2, 0, 1], [0, 1, 2]])
+"""Of each edge of a triangle: both ends, and the corner opposite."""
+
+
+def silhouettes(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Find the edges at which a surface, seen from the front, ends or turns back.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+    faces : (m, 3) int64
+
+    Returns
+    -------
+    (e, 2) int64
+        Edges of one face or of more than two, those whose two faces lie on the same side, and those of faces
+        that stand upright.
+    """
+    start, end, opposite = faces[:, _CORNERS].transpose(2, 0, 1).reshape(3, -1)
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    plane = vertices[:, :2]
+    side = np.sign(_cross(plane[high] - plane[low], plane[opposite] - plane[low]))
+    edge = low * len(vertices) + high
+    order = np.argsort(edge, kind="stable")
+    first = np.flatnonzero(np.diff(edge[order], prepend=-1))
+    count = np.diff(np.append(first, len(order)))
+    following = order[np.minimum(first + 1, len(order) - 1)]
+    plain = (count == 2) & (side[order[first]] * side[following] < 0)
+    return np.stack(np.divmod(edge[order[first]][~plain], len(vertices)), axis=1)
+
+
+def silhouette_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Pairs:
+    """Pair the points of two silhouettes that cross in the picture.
+
+    Where surfaces have changed places, they did so in a part of the picture that ends where they cross each
+    other, or at a silhouette of one of them. So a vertex lies in it, or an edge pierces a triangle at its
+    border, or two silhouettes cross at its corner; or the surface has folded over at a silhouette, and the
+    edges of neighbours cross there.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+        In the relief frame, in relief units.
+    faces : (m, 3) int64
+
+    Returns
+    -------
+    Pairs
+        Whether anything lies between them or not.
+
+    Examples
+    --------
+    Two narrow triangles, crosswise, one unit apart:
+
+    >>> places = np.array([[-9, 0, 0], [9, 0, 0], [9, 1, 0], [0, -9, 1], [0, 9, 1], [1, 9, 1.0]])
+    >>> silhouette_pairs(places, np.array([[0, 1, 2], [3, 4, 5]])).gap.tolist()
+    [1.0, 1.0, 1.0, 1.0]
+    """
+    edges = edges_of(faces)
+    turning = np.isin(edges @ [len(vertices), 1], silhouettes(vertices, faces) @ [len(vertices), 1])
+    far, near = _in_one_cell(vertices, edges, np.flatnonzero(turning)), _in_one_star(faces, edges, turning)
+    one, other = np.concatenate([far, near], axis=1)
+    one, other, share, other_share = _meeting(vertices[:, :2], edges, one, other)
+    ends, other_ends = vertices[edges[one], 2], vertices[edges[other], 2]
+    height = ends[:, 0] * (1.0 - share) + ends[:, 1] * share
+    other_height = other_ends[:, 0] * (1.0 - other_share) + other_ends[:, 1] * other_share
+    above = height > other_height
+    upper, upper_share = np.where(above, one, other), np.where(above, share, other_share)
+    lower, lower_share = np.where(above, other, one), np.where(above, other_share, share)
+    pairs = Pairs(
+        upper=edges[upper][:, [0, 1, 1]],
+        upper_weights=_weights(upper_share),
+        lower=edges[lower][:, [0, 1, 1]],
+        lower_weights=_weights(lower_share),
+        gap=np.abs(height - other_height),
+    )
+    return pairs.select(pairs.gap > _APART)
+
+
+def _in_one_cell(
+    vertices: NDArray[np.float64], edges: NDArray[np.int64], chosen: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Find chosen edges that pass through one cell of a raster: their numbers, (2, q), some twice."""
+    low = vertices[:, :2].min(axis=0)
+    extent = float(np.ptp(vertices[:, :2], axis=0).max())
+    cells = int(np.clip(np.sqrt(len(chosen)), _FEWEST_CELLS, _MOST_CELLS))
+    begin, end = (vertices[edges[chosen], :2] - low).transpose(1, 0, 2) * (cells / max(extent, 1e-30))
+    # Edges in pieces that are no longer than a cell: each meets four cells at most.
+    pieces = np.maximum(np.ceil(np.abs(end - begin).max(axis=1)).astype(np.int64), 1)
+    edge = np.repeat(np.arange(len(chosen)), pieces)
+    number = np.arange(len(edge)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+    step = ((end - begin) / pieces[:, None])[edge]
+    first = begin[edge] + step * number[:, None]
+    least = np.floor(np.minimum(first, first + step) - 1e-9).astype(np.int64)
+    most = np.floor(np.maximum(first, first + step) + 1e-9).astype(np.int64)
+    keys = []
+    for corner in np.array([[0, 0], [0, 1], [1, 0], [1, 1]]):
+        cell = least + corner
+        inside = (cell <= most).all(axis=1)
+        place = (cell[inside, 0] + 1) * (cells + 3) + cell[inside, 1] + 1
+        keys.append(place * len(edges) + chosen[edge[inside]])
+    return _within(np.concatenate(keys), len(edges))
+
+
+def _in_one_star(
+    faces: NDArray[np.int64], edges: NDArray[np.int64], turning: NDArray[np.bool_]
+) -> NDArray[np.int64]:
+    """Find edges of faces that share a vertex of a silhouette: their numbers, (2, q), some twice."""
+    n = int(faces.max(initial=0)) + 1
+    at_turning = np.zeros(n, dtype=bool)
+    at_turning[edges[turning]] = True
+    around = faces[at_turning[faces].any(axis=1)]
+    low, high = np.sort(around[:, [[0, 1], [1, 2], [2, 0]]], axis=2).transpose(2, 0, 1)
+    number = np.searchsorted(edges @ [n, 1], low * n + high)
+    keys = around[:, :, None] * len(edges) + number[:, None, :]
+    return _within(keys[at_turning[around]].ravel(), len(edges))
+
+
+def _within(keys: NDArray[np.int64], n: int) -> NDArray[np.int64]:
+    """Combine the members of each group with each other; keys are n times the group plus the member."""
+    keys = np.sort(keys)
+    group, member = np.divmod(keys[np.diff(keys, prepend=-1) > 0], max(n, 1))
+    start = np.flatnonzero(np.diff(group, prepend=-1))
+    count = np.diff(np.append(start, len(group)))
+    later = np.repeat(start + count, count) - np.arange(len(group)) - 1
+    one = np.repeat(np.arange(len(group)), later)
+    other = one + 1 + np.arange(len(one)) - np.repeat(np.cumsum(later) - later, later)
+    return np.stack([member[one], member[other]])
+
+
+def _meeting(
+    plane: NDArray[np.float64],
+    edges: NDArray[np.int64],
+    one: NDArray[np.int64],
+    other: NDArray[np.int64],
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Choose the edges that cross in the picture, each two once; return where, as shares of both."""
+    shares: list[NDArray[np.float64]] = []
+    for _ in (0, 1):
+        first, second = _sides(plane, edges, one, other)
+        apart = np.flatnonzero(first * second < 0.0)
+        one, other, first, second = one[apart], other[apart], first[apart], second[apart]
+        direction = plane[edges[other, 1]] - plane[edges[other, 0]]
+        clear = np.minimum(np.abs(first), np.abs(second)) > _CLEAR * np.linalg.norm(direction, axis=1)
+        shares = [(before[apart])[clear] for before in shares] + [(first / (first - second))[clear]]
+        one, other = other[clear], one[clear]
+    _, once = np.unique(one * len(edges) + other, return_index=True)
+    return one[once], other[once], shares[0][once], shares[1][once]
+
+
+def _sides(
+    plane: NDArray[np.float64],
+    edges: NDArray[np.int64],
+    one: NDArray[np.int64],
+    other: NDArray[np.int64],
+) -> list[NDArray[np.float64]]:
+    """Return on which side of other edges both ends of some lie: twice the area of the triangle."""
+    x, y = np.ascontiguousarray(plane.T)
+    begin, end = edges[other].T
+    origin_x, origin_y = x[begin], y[begin]
+    along_x, along_y = x[end] - origin_x, y[end] - origin_y
+    return [along_x * (y[tip] - origin_y) - along_y * (x[tip] - origin_x) for tip in edges[one].T]
+
+
+def _weights(share: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.stack([1.0 - share, share, np.zeros_like(share)], axis=1)
+
+
+def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
