@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
@@ -16,6 +14,9 @@ __all__ = ["smooth_normals", "trimmed_mesh"]
 
 _CREASE = 0.866
 """Cosine of 30 degrees: normals at one place that differ more from their mean stay apart."""
+
+_BLOCK = 16384
+"""Faces that are worked on at once."""
 
 
 def trimmed_mesh(
@@ -85,24 +86,34 @@ def smooth_normals(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> N
     (n, 3) float64
         Of unit length; +z for a vertex whose faces have no area.
     """
-    a, b, c = vertices[faces].transpose(1, 0, 2)
-    area_normal = np.cross(b - a, c - a)
-    own = np.stack(
-        [
-            np.bincount(faces.ravel(), weights=np.repeat(along, 3), minlength=len(vertices))
-            for along in area_normal.T
-        ],
-        axis=1,
-    )
+    own = _area_normals(vertices, faces)
     first = same_places(vertices, faces)
-    shared = np.stack(
-        [np.bincount(first, weights=along, minlength=len(vertices)) for along in own.T], axis=1
-    )[first]
-    own_unit, shared_unit = _unit(own), _unit(shared)
+    own_unit = _unit(own)
+    if (first == np.arange(len(first))).all():
+        return own_unit
+    shared = np.stack([np.bincount(first, weights=along, minlength=len(vertices)) for along in own.T], axis=1)
+    shared_unit = _unit(np.asarray(shared, dtype=np.float64))[first]
     alike = (own_unit * shared_unit).sum(axis=1) >= _CREASE
     return np.where(alike[:, None], shared_unit, own_unit)
 
 
-def _unit(vectors: NDArray[Any]) -> NDArray[np.float64]:
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return np.where(length > 0.0, vectors / np.where(length > 0.0, length, 1.0), [0.0, 0.0, 1.0])
+def _area_normals(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Add up the normals of the faces around each vertex, as long as twice their areas."""
+    places, corners = np.ascontiguousarray(vertices.T), np.ascontiguousarray(faces.T)
+    own = np.zeros(places.shape)
+    for begin in range(0, len(faces), _BLOCK):
+        a, b, c = corners[:, begin : begin + _BLOCK]
+        (ux, uy, uz), (vx, vy, vz) = (places[:, end] - places[:, a] for end in (b, c))
+        normal = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        for total, along in zip(own, normal, strict=True):
+            for corner in (a, b, c):
+                np.add.at(total, corner, along)
+    return np.ascontiguousarray(own.T)
+
+
+def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    length = np.sqrt(np.einsum("nc,nc->n", vectors, vectors))
+    flat = length == 0.0
+    result = vectors / np.where(flat, 1.0, length)[:, None]
+    result[flat] = [0.0, 0.0, 1.0]
+    return np.asarray(result)

@@ -298,7 +298,12 @@ def turned_to_viewer(
     """
     _, label = connected_components(laplacian, directed=False)
     wrong = wrongly_wound(vertices, scene.faces)
-    wound = np.where(wrong[:, None], scene.faces[:, [0, 2, 1]], scene.faces)
+    wound = _turned(scene.faces, wrong)
     away = turned_away(vertices, wound, visible, label)
     turn = np.append(wrong ^ away[label[scene.faces[:, 0]]], False)[scene.welded_face]  # -1 takes the last
-    return np.where(turn[:, None], in_faces[:, [0, 2, 1]], in_faces), int(turn.sum())
+    return _turned(in_faces, turn), int(turn.sum())
+
+
+def _turned(faces: NDArray[np.int64], chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return faces, some of them turned round."""
+    return np.where(chosen[:, None], faces[:, [0, 2, 1]], faces) if chosen.any() else faces

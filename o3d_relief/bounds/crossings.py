@@ -196,9 +196,15 @@ def crossing_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> P
 
 def edges_of(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return the edges of a mesh, (e, 2), each once, by their vertices in rising order."""
-    low, high = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1).T
-    n = int(high.max(initial=0)) + 1
-    return np.stack(np.divmod(np.unique(low * n + high), n), axis=1)
+    start = np.ascontiguousarray(faces.T)
+    end = start[[1, 2, 0]]
+    n = int(faces.max(initial=0)) + 1
+    ordered = np.sort(
+        (np.minimum(start, end) * n + np.maximum(start, end)).ravel()
+    )  # np.unique takes thirty times as long on some versions of NumPy
+    is_new = np.ones(len(ordered), dtype=bool)
+    is_new[1:] = ordered[1:] != ordered[:-1]
+    return np.stack(np.divmod(ordered[is_new], n), axis=1)
 
 
 def crossings(vertices: NDArray[np.float64], faces: NDArray[np.int64], edges: NDArray[np.int64]) -> Crossings:

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
-import pyamg
 import scipy.sparse as sp
 import scipy.sparse.linalg as sla
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from o3d_relief.errors import SolverError
+from o3d_relief.linalg.multigrid import Multigrid, multigrid
 from o3d_relief.progress import Tick, silent
 
 __all__ = ["multigrid", "solve_direct", "solve_spd"]
 
 _DIRECT_UP_TO = 4000
 _MAX_ITERATIONS = 1000
+
+_LOOK_BACK = 6
+"""Steps of the iteration from which is estimated what is left."""
 
 _GOOD_ENOUGH = 1e-8
 """Relative residual above which a solution is refused."""
@@ -27,6 +32,7 @@ def solve_spd(
     *,
     similar: sp.csr_array | None = None,
     tolerance: float = 1e-12,
+    error: float = 0.0,
     tick: Tick = silent,
 ) -> NDArray[np.float64]:
     """Solve A x = b for a sparse symmetric positive definite A.
@@ -44,6 +50,8 @@ def solve_spd(
         `matrix` itself where omitted.
     tolerance : float
         Norm of the residual relative to that of `right_hand_side` at which the iteration stops.
+    error : float
+        Energy norm of the error, sqrt(e' A e), at which it stops, too, as far as that can be estimated.
     tick : callable, optional
         Called in every step of the iteration; it may raise to end the work.
 
@@ -64,14 +72,17 @@ def solve_spd(
     n = len(right_hand_side)
     if n == 0 or not right_hand_side.any():
         return np.zeros(n)
+    left = np.inf
     with threadpool_limits(limits=1):
         if n <= _DIRECT_UP_TO:
             solution = solve_direct(matrix, right_hand_side)
         else:
-            similar = matrix if similar is None else similar
-            solution = _multigrid(matrix, right_hand_side, similar, tolerance, tick)
+            cycle = Multigrid(matrix if similar is None else similar)
+            solution, left = _conjugate_gradients(matrix, right_hand_side, cycle, tolerance, error, tick)
         residual = np.linalg.norm(matrix @ solution - right_hand_side)
         reached = float(residual / np.linalg.norm(right_hand_side))
+    if left <= error**2:
+        return solution
     if not reached <= max(_GOOD_ENOUGH, 10.0 * tolerance):
         raise SolverError(
             f"A linear system of {n} unknowns was solved to {reached:.1e} only, not to {_GOOD_ENOUGH:.0e}; "
@@ -106,52 +117,45 @@ def solve_direct(matrix: sp.csr_array, right_hand_side: NDArray[np.float64]) -> 
     return np.asarray(factor.solve(right_hand_side), dtype=np.float64)
 
 
-def _with_small_indices(matrix: sp.csr_array) -> sp.csr_matrix:
-    """Return a matrix with 32-bit indices, sorted: pyamg goes wrong with others, in silence."""
-    matrix = matrix if matrix.has_sorted_indices else matrix.sorted_indices()
-    parts = matrix.data, matrix.indices.astype(np.int32), matrix.indptr.astype(np.int32)
-    return sp.csr_matrix(parts, shape=matrix.shape)
-
-
-def multigrid(matrix: sp.csr_array) -> sla.LinearOperator:
-    """Build a preconditioner for a sparse symmetric positive definite matrix.
-
-    Parameters
-    ----------
-    matrix : (n, n) sparse float64
-
-    Returns
-    -------
-    LinearOperator
-        One V-cycle of smoothed aggregation multigrid.
-    """
-    # "local" weighting bounds the spectral radius row by row; pyamg's default estimates it from a random
-    # vector, which would change the last digits from run to run.
-    hierarchy = pyamg.smoothed_aggregation_solver(
-        _with_small_indices(matrix),
-        strength=None,
-        improve_candidates=None,
-        smooth=("jacobi", {"weighting": "local"}),
-        coarse_solver="splu",
-        max_coarse=500,
-    )
-    return hierarchy.aspreconditioner()
-
-
-def _multigrid(
+def _conjugate_gradients(
     matrix: sp.csr_array,
     right_hand_side: NDArray[np.float64],
-    similar: sp.csr_array,
+    precondition: Callable[[NDArray[np.float64]], NDArray[np.float64]],
     tolerance: float,
+    error: float,
     tick: Tick,
-) -> NDArray[np.float64]:
-    solution, _ = sla.cg(
-        matrix,
-        right_hand_side,
-        rtol=tolerance,
-        atol=0.0,
-        maxiter=_MAX_ITERATIONS,
-        M=multigrid(similar),
-        callback=lambda _solution: tick(None),
-    )
-    return np.asarray(solution, dtype=np.float64)
+) -> tuple[NDArray[np.float64], float]:
+    """Iterate until the residual or the error is small enough; tell the squared energy norm of the error."""
+    solution = np.zeros(len(right_hand_side))
+    residual = right_hand_side.copy()
+    small = tolerance * float(np.linalg.norm(right_hand_side))
+    direction, last = np.zeros(0), 0.0
+    gains: list[float] = []
+    for _ in range(_MAX_ITERATIONS):
+        tick(None)
+        steepest = precondition(residual)
+        now = float(residual @ steepest)
+        direction = steepest if not gains else steepest + (now / last) * direction
+        along = matrix @ direction
+        curvature = float(direction @ along)
+        if not (curvature > 0.0 and now > 0.0):
+            break
+        step, last = now / curvature, now
+        solution += step * direction
+        residual -= step * along
+        gains.append(step * now)
+        if np.linalg.norm(residual) <= small or _energy_left(gains) <= error**2:
+            break
+    return solution, _energy_left(gains)
+
+
+def _energy_left(gains: list[float]) -> float:
+    """Estimate the squared energy norm of the error from what each step has taken off it.
+
+    The steps to come take off all that is left; they are taken to go on shrinking as the last few have done.
+    """
+    if len(gains) <= _LOOK_BACK:
+        return np.inf
+    recent = gains[-_LOOK_BACK:]
+    shrinking = (max(recent[_LOOK_BACK // 2 :]) / max(recent[: _LOOK_BACK // 2])) ** (2.0 / _LOOK_BACK)
+    return max(recent[_LOOK_BACK // 2 :]) / (1.0 - shrinking) if shrinking < 1.0 else np.inf

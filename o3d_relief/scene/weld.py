@@ -7,6 +7,7 @@ apart along each seam.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -21,6 +22,10 @@ SEAM = 1e-3
 
 The two sides of a seam often differ by rounding errors, of float32 or of a text with six digits.
 """
+
+
+_MIXERS = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)
+"""Odd factors without a pattern, for checksums of rows of three."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -53,16 +58,28 @@ class Welded:
     duplicate_faces: int
 
 
-def first_of_equal_rows(rows: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Find for each row of (n, c) the first one that equals it, (n,)."""
-    order = np.lexsort(rows.T)  # stable: equal rows stay in input order
-    ordered = rows[order]
-    is_new = np.ones(len(rows), dtype=bool)
-    is_new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+def first_of_equal_rows(rows: NDArray[Any]) -> NDArray[np.int64]:
+    """Find for each row of (n, c) the first one that equals it, (n,).
+
+    Rows are compared by a checksum first: only those that share theirs with another one need a sort.
+    """
+    itself = np.arange(len(rows))
+    # Adding zero makes zeros of both signs the same bits.
+    bits = np.ascontiguousarray(rows + rows.dtype.type(0)).view(np.uint64)
+    checksum = bits @ _MIXERS[: bits.shape[1]]
+    ordered = np.sort(checksum)
+    shared = ordered[1:][ordered[1:] == ordered[:-1]]
+    if len(shared) == 0:
+        return itself
+    place = np.minimum(np.searchsorted(shared, checksum), len(shared) - 1)
+    some = np.flatnonzero(shared[place] == checksum)
+    among = rows[some]
+    order = np.lexsort(among.T)  # stable: equal rows stay in input order
+    is_new = np.ones(len(some), dtype=bool)
+    is_new[1:] = (among[order[1:]] != among[order[:-1]]).any(axis=1)
     first = order[is_new][np.cumsum(is_new) - 1]
-    result = np.zeros(len(rows), dtype=np.int64)
-    result[order] = first
-    return result
+    itself[some[order]] = some[first]
+    return itself
 
 
 def _whole(faces: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -113,12 +130,31 @@ def same_places(
 
 def _rim(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return the vertices of edges that only one face has."""
-    different = np.unique(np.sort(faces[_whole(faces)], axis=1), axis=0)
-    edges = different[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2)
-    _, first, count = np.unique(
-        edges @ np.array([faces.max(initial=0) + 1, 1]), return_index=True, return_counts=True
-    )
-    return np.unique(edges[first[count == 1]])
+    different = _sorted_corners(faces[_whole(faces)])
+    different = different[_is_first(different)]
+    n = int(faces.max(initial=0)) + 1
+    low, middle, high = different.T
+    edges = np.sort(np.concatenate([low * n + middle, middle * n + high, low * n + high]))
+    same = edges[1:] == edges[:-1]
+    alone = np.ones(len(edges), dtype=bool)
+    alone[1:] &= ~same
+    alone[:-1] &= ~same
+    single = edges[alone]
+    rim = np.zeros(n, dtype=bool)
+    rim[single // n] = True
+    rim[single % n] = True
+    return np.flatnonzero(rim)
+
+
+def _sorted_corners(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the corners of each face in rising order, (m, 3)."""
+    a, b, c = faces.T
+    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+    return np.stack([low, a + b + c - low - high, high], axis=1)
+
+
+def _is_first(rows: NDArray[np.int64]) -> NDArray[np.bool_]:
+    return np.asarray(first_of_equal_rows(rows) == np.arange(len(rows)))
 
 
 def weld(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Welded:
@@ -146,7 +182,7 @@ def weld(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Welded:
     merged = stands_for[faces]
     whole = _whole(merged)
     candidates = merged[whole]
-    same = first_of_equal_rows(np.sort(candidates, axis=1).astype(np.float64))
+    same = first_of_equal_rows(_sorted_corners(candidates))
     is_first = same == np.arange(len(same))
     kept = candidates[is_first]
     used = np.zeros(len(vertices), dtype=bool)

@@ -37,6 +37,10 @@ def wrongly_wound(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> ND
     [True, False]
     """
     m = len(faces)
+    # Where no edge is walked the same way twice, all faces that share one agree.
+    directed = np.sort(faces * (int(faces.max()) + 1) + faces[:, [1, 2, 0]], axis=None)
+    if (directed[1:] != directed[:-1]).all():
+        return np.zeros(m, dtype=bool)
     one, other, agree = _neighbours(faces)
     if agree.all():
         return np.zeros(m, dtype=bool)

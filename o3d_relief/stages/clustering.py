@@ -13,6 +13,10 @@ __all__ = ["cluster_vertices"]
 _CELLS = 256
 """Side of the grid of cells whose weighted means stand for their vertices on large meshes."""
 
+_BITS = 28
+"""The extent is divided into 2^28 steps: fine enough for the grid of the scene, and the sum of 2^25
+coordinates still is a whole number of them in float64."""
+
 _SAMPLES_PER_CLUSTER = 32
 """Cells are used where they leave at least this many samples for each cluster."""
 
@@ -45,8 +49,7 @@ def cluster_vertices(
     [[0.0, 0.5], [9.0, 0.5]]
     """
     samples, weights = _samples(xy, k)
-    distinct = len(np.unique(samples, axis=0))
-    kmeans = KMeans(n_clusters=min(k, distinct), n_init=1, random_state=seed)
+    kmeans = KMeans(n_clusters=min(k, _distinct(samples)), n_init=1, random_state=seed)
     # The order in which threads add up their partial means would change the last digits.
     with threadpool_limits(limits=1):
         kmeans.fit(samples, sample_weight=weights)
@@ -60,15 +63,21 @@ def _samples(xy: NDArray[np.float64], k: int) -> tuple[NDArray[np.float64], NDAr
 
     In an order of their own, so that the seeding does not depend on how the vertices are numbered.
     """
-    in_order = xy[np.lexsort(xy.T)]
-    if len(xy) <= _CELLS**2:
-        return in_order, np.ones(len(xy))
     low = xy.min(axis=0)
-    step = float((xy.max(axis=0) - low).max()) / _CELLS
-    cell = np.minimum((in_order - low) // step, _CELLS - 1).astype(np.int64) @ np.array([1, _CELLS])
-    weights = np.bincount(cell, minlength=_CELLS**2).astype(np.float64)
-    sums = np.stack([np.bincount(cell, weights=c, minlength=_CELLS**2) for c in in_order.T], axis=1)
-    full = weights > 0
-    if full.sum() < _SAMPLES_PER_CLUSTER * k:
-        return in_order, np.ones(len(xy))
-    return sums[full] / weights[full, None], weights[full]
+    extent = float((xy.max(axis=0) - low).max())
+    if len(xy) > _CELLS**2 and extent > 0.0:
+        # Whole steps: their sums are exact, whatever the order of the vertices.
+        step = 2.0 ** (np.ceil(np.log2(extent)) - _BITS)
+        off = np.rint((xy - low) / step)
+        cell = np.minimum(off // (extent / step / _CELLS), _CELLS - 1).astype(np.int64) @ [1, _CELLS]
+        weights = np.bincount(cell, minlength=_CELLS**2).astype(np.float64)
+        full = weights > 0
+        if full.sum() >= _SAMPLES_PER_CLUSTER * k:
+            sums = np.stack([np.bincount(cell, weights=c, minlength=_CELLS**2) for c in off.T], axis=1)
+            return low + step * (sums[full] / weights[full, None]), weights[full]
+    return xy[np.lexsort(xy.T)], np.ones(len(xy))
+
+
+def _distinct(samples: NDArray[np.float64]) -> int:
+    """Count the different positions; equal ones follow each other."""
+    return 1 + int((samples[1:] != samples[:-1]).any(axis=1).sum())

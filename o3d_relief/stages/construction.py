@@ -16,6 +16,11 @@ from o3d_relief.progress import Tick, silent
 __all__ = ["Construction", "construct", "leaders"]
 
 
+_EXACT = 1e-6
+"""Energy norm of the error, in relief units, to which the displacement is solved: heights are then exact to
+1e-8 of the extent."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Construction:
     """The result of Eq. 7.
@@ -127,7 +132,7 @@ def _solve_free(
         right_hand_side = pull[free]
     displacement[free] = 0.0
     right_hand_side = right_hand_side - rows @ displacement
-    displacement[free] = solve_spd(rows[:, free].tocsr(), right_hand_side, tick=tick)
+    displacement[free] = solve_spd(rows[:, free].tocsr(), right_hand_side, error=_EXACT, tick=tick)
 
 
 def _move_loose(

@@ -16,6 +16,9 @@ __all__ = ["Restoration", "restore"]
 _BELOW = 1e-6
 """Relief units below the floor that count as on it in the search; the result is set onto it."""
 
+_EXACT = 1e-6
+"""Energy norm of the error, in relief units, to which each system is solved."""
+
 _ROUNDS = 30
 
 
@@ -179,6 +182,7 @@ class _System:
             operator[:, columns].tocsr(),
             -(operator @ displacement),
             similar=self._first[moving][:, columns].tocsr(),
+            error=_EXACT,
             tick=self._tick,
         )
         force = np.zeros(len(z))

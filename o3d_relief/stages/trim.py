@@ -10,6 +10,10 @@ from numpy.typing import NDArray
 __all__ = ["Trimmed", "trim_behind"]
 
 
+_UNUSABLE = -2
+"""Stands for the side of a vertex that is to be dropped."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Trimmed:
     """A mesh cut at z = 0 and where each of its pieces comes from.
@@ -86,19 +90,19 @@ def trim_behind(
     >>> trim_behind(v, np.array([[0, 1, 2]]), np.ones(3, dtype=bool)).vertices[2:].tolist()
     [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
     """
-    side = np.sign(vertices[:, 2]).astype(np.int64)
-    face_side = side[faces]
-    whole_face = usable[faces].all(axis=1)
-    behind = (face_side < 0).any(axis=1)
-    in_front = (face_side > 0).any(axis=1)
-    uncut = np.flatnonzero(whole_face & ~behind)
-    straddling = np.flatnonzero(whole_face & behind & in_front)
+    side = np.sign(vertices[:, 2]).astype(np.int8)
+    corners = np.ascontiguousarray(faces.T)
+    one, two, three = (np.where(usable, side, _UNUSABLE)[corner] for corner in corners)
+    lowest = np.minimum(np.minimum(one, two), three)
+    highest = np.maximum(np.maximum(one, two), three)
+    uncut = np.flatnonzero(lowest >= 0)
+    straddling = np.flatnonzero((lowest == -1) & (highest > 0))
 
-    pieces, piece_from, edges = _cut_faces(faces[straddling], face_side[straddling], vertices[:, 2])
-    all_faces = np.concatenate([faces[uncut], pieces])
+    cut = faces[straddling]
+    pieces, piece_from, edges = _cut_faces(cut, side[cut].astype(np.int64), vertices[:, 2])
     face_from = np.concatenate([uncut, straddling[piece_from]])
     order = np.argsort(face_from, kind="stable")
-    all_faces, face_from = all_faces[order], face_from[order]
+    all_faces, face_from = np.concatenate([faces[uncut], pieces])[order], face_from[order]
 
     used = np.zeros(len(vertices) + len(edges), dtype=bool)
     used[all_faces] = True

@@ -90,9 +90,9 @@ def turned_away(
     (components,) bool
         True where the visible faces, by their area as seen from the front, turn away from the viewer.
     """
-    a, b, c = vertices[faces][:, :, :2].transpose(1, 0, 2)
-    u, v = b - a, c - a
-    seen_area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
-    seen_area = np.where(visible[faces].all(axis=1), seen_area, 0.0)
-    total = np.bincount(label[faces[:, 0]], weights=seen_area, minlength=int(label.max()) + 1)
+    a, b, c = np.ascontiguousarray(faces.T)
+    x, y = np.ascontiguousarray(vertices[:, :2].T)
+    seen_area = (x[b] - x[a]) * (y[c] - y[a]) - (y[b] - y[a]) * (x[c] - x[a])
+    seen_area[~(visible[a] & visible[b] & visible[c])] = 0.0
+    total = np.bincount(label[a], weights=seen_area, minlength=int(label.max()) + 1)
     return np.asarray(total < 0.0)

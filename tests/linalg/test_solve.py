@@ -46,6 +46,14 @@ def test_same_bytes_whatever_the_number_of_threads():
         assert solve_spd(matrix, right).tobytes() == once.tobytes()
 
 
+@pytest.mark.parametrize("error", [1e-2, 1e-4, 1e-6])
+def test_iteration_stops_at_the_error_that_is_allowed(error):
+    matrix, right = _system(90)
+    found = solve_spd(matrix, right, error=error)
+    off = found - sp.linalg.splu(matrix.tocsc()).solve(right)
+    assert 1e-3 * error < np.sqrt(off @ (matrix @ off)) < error
+
+
 def test_zero_right_hand_side_and_no_unknowns():
     matrix, right = _system(20)
     assert not solve_spd(matrix, 0 * right).any()
