@@ -236,7 +236,7 @@ def _add_params(command: argparse.ArgumentParser) -> None:
         ("in-front", "keep what is visible in front of the plane, where it is not trimmed"),
         ("in-order", "let no part pass through another"),
     ):
-        add(f"--{name}", action=argparse.BooleanOptionalAction, default=True,
+        add(f"--{name}", action=argparse.BooleanOptionalAction, default=argparse.SUPPRESS,
             help=f"{text} (default: yes; the paper: no)")  # fmt: skip
     add("--min-gap", type=float, default=default.min_gap, metavar="G",
         help="smallest gap in depth between parts, in the input's unit (default: %(default)s)")  # fmt: skip
@@ -246,6 +246,8 @@ def _add_params(command: argparse.ArgumentParser) -> None:
     add("--attach", type=_integers, default=(), metavar="N[,N...]",
         help="vertices to hold on the plane, bounded mode only")  # fmt: skip
     add("--seed", type=int, default=default.seed, metavar="N", help="default: %(default)s")
+    # Some Pythons add the default of a switch to its help once more, if they know it: they are told here.
+    command.set_defaults(smooth_points=True, in_front=True, in_order=True)
     # These are in parameter files only: one for each vertex, one for each point.
     command.set_defaults(weights=default.weights, point_edits=default.point_edits)
 

@@ -87,7 +87,7 @@ def _halves(positions: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[
 class Factor:
     """A factor of a sparse symmetric positive definite matrix over the vertices of a mesh.
 
-    It takes some 1.7 kB of memory for each vertex of a surface of 250,000, and 10 % more for each doubling.
+    It takes some 1.8 kB of memory for each vertex of a surface of 250,000, and 10 % more for each doubling.
 
     Parameters
     ----------

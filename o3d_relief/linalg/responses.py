@@ -30,7 +30,7 @@ class Responses:
 
     G is held in float32: 4 n p bytes, 128 MB for 250,000 vertices and 128 points. Its rounding errors of
     6e-8 are averaged by the weights: heights are exact to about 1e-7 of the largest displacement. The
-    factor that it is made with takes as much again four times over and is let go unless it is kept.
+    factor that it is made with takes 1.8 kB for each vertex and is let go unless it is kept.
 
     Parameters
     ----------
