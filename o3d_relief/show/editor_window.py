@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,8 @@ __all__ = ["EditorWindow"]
 
 _PANEL_EMS = 21.0
 _CLICK = 4  # pixels that a click may move
+_DRAW_EVERY = 0.25  # seconds
+_FRESH = 1.5  # seconds for which something new is drawn again and again
 
 
 class EditorWindow:
@@ -66,7 +69,8 @@ class EditorWindow:
         self._said = ""
         self._scene = EditorScene(self._window.renderer)
         self._scene.widget.set_on_mouse(self._mouse)
-        self._news = False
+        self._news = self._leaving = False
+        self._fresh = self._drawn = 0.0
         self.studio = Studio(mesh, params, view, self._note)
         self._panel = EditorPanel(
             self.studio,
@@ -96,20 +100,32 @@ class EditorWindow:
         return self._result
 
     def quit(self) -> None:
-        """Close the window; may be called from any thread."""
-        self._application.post_to_main_thread(self._window, self._window.close)
+        """Close the window soon; may be called from any thread."""
+        self._leaving = True
 
     def _note(self) -> None:
         """Take note, on the studio's thread, that there are news."""
         self._news = True
 
     def _tick(self) -> bool:
-        """Show the news, if there are any. Open3D loses what is posted to it before it runs: it is asked."""
+        """Show the news, if there are any; tell whether to draw.
+
+        Open3D loses what is posted to it before it runs, and frames that a slow driver has no time for: so it
+        looks for news here, and draws again now and then.
+        """
+        now = time.monotonic()
+        if self._leaving:
+            self._window.close()
+            return False
         if self._news:
-            self._news = False
+            self._news, self._fresh = False, now
             self._show()
-            return True
-        return False
+        if now - self._drawn < _DRAW_EVERY:
+            return False
+        self._drawn = now
+        if now - self._fresh < _FRESH:
+            self._scene.widget.force_redraw()
+        return True
 
     def _show(self) -> None:
         sight, work = self.studio.sight, self.studio.work
@@ -207,6 +223,7 @@ class EditorWindow:
         if sight is not None:
             self._scene.mark(sight, self.chosen)
             self._panel.show_choice(sight, self.chosen)
+            self._fresh = time.monotonic()
             self._window.post_redraw()
 
     def _take_tool(self, brush: bool, radius: float) -> None:

@@ -28,7 +28,7 @@ save_params("params.json", params, view)
 # Where the widgets are, in pixels of the window.
 WIDTH = 700
 PANEL = WIDTH - 336
-BETA, T1 = 167, 271
+BETA, ALPHA, T1 = 167, 218, 271
 SAVE, ATTACH = (PANEL + 40, 37), (PANEL + 41, 609)
 
 
@@ -105,14 +105,13 @@ def test_sliders_points_and_files(screen, editor, tmp_path):
     scene, panel = eye.wait(furnished)
     assert red(panel) == 0
 
-    screen.drag(eye.window, at(0.2, BETA), at(0.7, BETA))
-    wide, panel = eye.wait(lambda now, _: changed(scene, now) > 0.01)
-    assert changed(scene, wide) < 0.9
+    screen.drag(eye.window, at(1.0, ALPHA), at(0.3, ALPHA))
+    flat, panel = eye.wait(lambda now, _: changed(scene, now) > 0.01)
 
     # The middle of the relief: the point next to it turns white, and its name is told.
     screen.click(eye.window, (PANEL // 2, 400))
-    chosen, named = eye.wait(lambda now, _: changed(wide, now) > 0.0002)
-    assert changed(wide, chosen) < 0.02
+    chosen, named = eye.wait(lambda now, _: changed(flat, now) > 0.0002)
+    assert changed(flat, chosen) < 0.02
     assert changed(panel[500:600], named[500:600]) > 0.002
     screen.click(eye.window, ATTACH)
     attached, _ = eye.wait(lambda now, _: changed(chosen, now) > 0.002)
@@ -131,7 +130,7 @@ def test_sliders_points_and_files(screen, editor, tmp_path):
     assert editor.process.wait(timeout=120) == 0, editor.lines()
 
     params, view = load_params(tmp_path / "params.json")
-    assert params.beta == pytest.approx(0.7, abs=0.03)
+    assert params.alpha == pytest.approx(0.05 + 0.95 * 0.3, abs=0.03)  # the slider begins at 0.05
     assert params.discard_above == pytest.approx(0.6)
     assert params.k == 12
     assert [edit.action for edit in params.point_edits] == ["attach"]
