@@ -51,7 +51,7 @@ def decode_las(data: bytes) -> CloudArrays:
         import laspy
     except ImportError:
         raise FileError(
-            "LAS and LAZ files need the packages laspy and lazrs (pip install 'o3d-relief[las]')"
+            "LAS and LAZ files need the packages laspy and lazrs (pip install 'laspy[lazrs]')"
         ) from None
     _check_header(data)
     try:

@@ -220,7 +220,7 @@ class TestLas:
     def test_without_laspy(self, tmp_path, monkeypatch):
         monkeypatch.setitem(__import__("sys").modules, "laspy", None)
         with pytest.raises(
-            FileError, match=r"need the packages laspy and lazrs \(pip install 'o3d-relief\[las\]'\)"
+            FileError, match=r"need the packages laspy and lazrs \(pip install 'laspy\[lazrs\]'\)"
         ):
             read_points(save(tmp_path / "a.las", b"LASF"))
 
