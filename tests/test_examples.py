@@ -27,6 +27,7 @@ def _load(name):
 
 
 FIGURES = [
+    "bounded_depths",
     "figure_05_perspective",
     "figure_06_curve",
     "figure_07_attenuation",

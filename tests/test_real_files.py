@@ -100,8 +100,9 @@ def test_certificate_of_single_bodies_is_clean(reliefs, name):
     assert certificate.grid_pairs_tested > 50_000
 
 
+# The second file of igea holds the triangles of the first (tests/scene/test_read.py compares them).
 @pytest.mark.parametrize("share", [0.5, 0.25, 0.1, 0.05])
-@pytest.mark.parametrize("name", [name for name in MESHES if "city" not in name])
+@pytest.mark.parametrize("name", [name for name in MESHES if "city" not in name and "tristrips" not in name])
 def test_bounded_reliefs_are_as_deep_as_asked_for_and_clean(reliefs, data_folder, name, share):
     view = reliefs(name).view
     depth = share * reliefs(name).summary()["scene_visible_depth"]
