@@ -33,6 +33,7 @@ def solve_spd(
     similar: sp.csr_array | None = None,
     tolerance: float = 1e-12,
     error: float = 0.0,
+    start: NDArray[np.float64] | None = None,
     tick: Tick = silent,
 ) -> NDArray[np.float64]:
     """Solve A x = b for a sparse symmetric positive definite A.
@@ -52,6 +53,8 @@ def solve_spd(
         Norm of the residual relative to that of `right_hand_side` at which the iteration stops.
     error : float
         Energy norm of the error, sqrt(e' A e), at which it stops, too, as far as that can be estimated.
+    start : (n,) float64, optional
+        Where the iteration starts; zero where omitted.
     tick : callable, optional
         Called in every step of the iteration; it may raise to end the work.
 
@@ -78,7 +81,10 @@ def solve_spd(
             solution = solve_direct(matrix, right_hand_side)
         else:
             cycle = Multigrid(matrix if similar is None else similar)
-            solution, left = _conjugate_gradients(matrix, right_hand_side, cycle, tolerance, error, tick)
+            start = np.zeros(n) if start is None else start
+            solution, left = _conjugate_gradients(
+                matrix, right_hand_side, start, cycle, tolerance, error, tick
+            )
         residual = np.linalg.norm(matrix @ solution - right_hand_side)
         reached = float(residual / np.linalg.norm(right_hand_side))
     if left <= error**2:
@@ -120,14 +126,15 @@ def solve_direct(matrix: sp.csr_array, right_hand_side: NDArray[np.float64]) -> 
 def _conjugate_gradients(
     matrix: sp.csr_array,
     right_hand_side: NDArray[np.float64],
+    start: NDArray[np.float64],
     precondition: Callable[[NDArray[np.float64]], NDArray[np.float64]],
     tolerance: float,
     error: float,
     tick: Tick,
 ) -> tuple[NDArray[np.float64], float]:
     """Iterate until the residual or the error is small enough; tell the squared energy norm of the error."""
-    solution = np.zeros(len(right_hand_side))
-    residual = right_hand_side.copy()
+    solution = start.copy()
+    residual = right_hand_side - matrix @ solution
     small = tolerance * float(np.linalg.norm(right_hand_side))
     direction, last = np.zeros(0), 0.0
     gains: list[float] = []

@@ -158,14 +158,17 @@ class _System:
         inverse = np.where(weight_sum > 0.0, 1.0 / np.where(weight_sum > 0.0, weight_sum, 1.0), 0.0)
         second = first @ sp.diags_array(inverse) @ laplacian
         self._rows = rows
-        self._first = first
         self._tick = tick
         self._operator = (blend * first + (1.0 - blend) * second).tocsr()
+        self._within, self._first = self._operator[:, rows].tocsr(), first[:, rows].tocsr()
+        self._displacement = np.zeros(len(rows))
 
     def solve(
         self, original: NDArray[np.float64], z: NDArray[np.float64], held: NDArray[np.bool_]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Solve for the rows that are not held; `z` counts everywhere else.
+
+        Starts from what was found the last time, when mostly the same rows were held.
 
         Returns
         -------
@@ -177,16 +180,29 @@ class _System:
         columns = self._rows[moving]
         displacement = z - original
         displacement[columns] = 0.0
-        operator = self._operator[moving]
-        displacement[columns] = solve_spd(
-            operator[:, columns].tocsr(),
-            -(operator @ displacement),
-            similar=self._first[moving][:, columns].tocsr(),
+        found = solve_spd(
+            _holding(self._within, moving),
+            np.where(moving, -(self._operator @ displacement), 0.0),
+            similar=_holding(self._first, moving),
             error=_EXACT,
+            start=np.where(moving, self._displacement, 0.0),
             tick=self._tick,
         )
+        displacement[columns] = found[moving]
+        self._displacement = displacement[self._rows]
         force = np.zeros(len(z))
-        force[self._rows[~moving]] = self._operator[~moving] @ displacement
+        force[self._rows[~moving]] = (self._operator @ displacement)[~moving]
         result = z.copy()
         result[columns] = original[columns] + displacement[columns]
         return result, force
+
+
+def _holding(matrix: sp.csr_array, moving: NDArray[np.bool_]) -> sp.csr_array:
+    """Return a matrix of which the rows and columns that do not move have their diagonal left alone."""
+    if moving.all():
+        return matrix
+    row = np.repeat(np.arange(len(moving)), np.diff(matrix.indptr))
+    stays = (moving[row] & moving[matrix.indices]) | (row == matrix.indices)
+    count = np.concatenate([[0], np.cumsum(stays)])
+    parts = matrix.data[stays], matrix.indices[stays], count[matrix.indptr]
+    return sp.csr_array(parts, shape=matrix.shape)
