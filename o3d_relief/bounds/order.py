@@ -176,10 +176,8 @@ class _BetweenLines:
         at[near] = True
         edges = self._edges[at[self._edges].all(axis=1)]
         crossing, count = new_crossings(self._vertices, near, edges, z)
-        if count:
-            return crossing, count
         at_foot = foot_pairs(self._vertices, near, edges, z)
-        return at_foot, len(at_foot)
+        return Pairs.join([crossing, at_foot]), count + len(at_foot)
 
 
 class _Lines:
