@@ -18,6 +18,7 @@ from o3d_relief.bounds.certificate import Certificate, certify
 from o3d_relief.errors import MeshError, ParameterError
 from o3d_relief.journal import Journal, OnStage
 from o3d_relief.linalg.laplacian import cotangent_laplacian
+from o3d_relief.order_step import order_step
 from o3d_relief.output import trimmed_mesh
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.progress import OnProgress
@@ -33,7 +34,6 @@ from o3d_relief.steps import (
     compression_step,
     construction_step,
     frame_step,
-    order_step,
     perspective_step,
     scene_step,
     stacked_pairs,

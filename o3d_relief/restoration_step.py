@@ -75,6 +75,7 @@ def restoration_step(
             near, elsewhere = bend_of(vertices, restored.z, faces, visible, index)
             if near <= _ROOM * elsewhere:
                 break
+            high = high | stiff.within  # large faces reach further than the discs
     counts |= {
         "solved": int(restored.solved.sum()),
         "points_held": restored.points_held,

@@ -10,14 +10,9 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from o3d_relief.attenuation_step import beta_of_clusters
-from o3d_relief.bounds.crossings import crossing_pairs
-from o3d_relief.bounds.order import keep_order
-from o3d_relief.bounds.pairs import Pairs, grid_pairs, vertex_pairs
+from o3d_relief.bounds.pairs import Pairs, vertex_pairs
 from o3d_relief.bounds.parts import tie_parts
-from o3d_relief.bounds.silhouettes import silhouette_pairs
-from o3d_relief.bounds.stiffness import Stiffness
 from o3d_relief.errors import MeshError, ParameterError
-from o3d_relief.linalg.laplacian import vertex_areas
 from o3d_relief.params import ReliefParams, Triple, View
 from o3d_relief.progress import Tick, silent
 from o3d_relief.records import (
@@ -25,9 +20,7 @@ from o3d_relief.records import (
     ClustersStage,
     CompressionStage,
     ConstructionStage,
-    OrderStage,
     PerspectiveStage,
-    RestorationStage,
     SceneStage,
     VisibilityStage,
 )
@@ -44,9 +37,6 @@ from o3d_relief.stages.visibility import turned_away, visible_vertices
 
 _OUT_OF_SHAPE = 1e3
 """A forced perspective that makes the scene larger or smaller by more than this leaves nothing of it."""
-
-_LINES = 256
-"""Lines along x and along y on which the order is kept, besides those through vertices and crossings."""
 
 _ON_PLANE = 1e-9
 """Heights within this of S, in relief units, lie on it: rounding errors leave no slivers at the cut."""
@@ -187,64 +177,12 @@ def construction_step(
     return ConstructionStage(z=built.z, counts=counts)
 
 
-def order_step(
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    visible: NDArray[np.bool_],
-    laplacian: sp.csr_array,
-    restored: RestorationStage,
-    points: AttenuationStage,
-    pairs: Pairs | None,
-    params: ReliefParams,
-    unit: float,
-    *,
-    tick: Tick = silent,
-) -> OrderStage:
-    """Keep everything in order along the viewing direction."""
-    z = restored.z
-    if pairs is None:
-        return OrderStage(z=on_plane(z))
-    if restored.stiffness > 0.0:
-        stiff = Stiffness(vertices, faces, points.kept_index)
-        laplacian = stiff.added_to(laplacian, restored.stiffness)
-    # The compression comes later and shrinks gaps, at most by its smallest ratio.
-    ratio, lowest = _ratios(z, params, unit)
-    min_gap = params.min_gap / unit / (0.95 * lowest if ratio < 1.0 else 1.0)
-    ordered = keep_order(
-        vertices,
-        faces,
-        laplacian,
-        vertex_areas(vertices, faces),
-        z,
-        Pairs.join([pairs, _further_pairs(vertices, faces, min_gap)]),
-        in_front=visible if params.in_front else None,
-        min_gap=min_gap,
-        tick=tick,
-    )
-    counts = {
-        "pairs_corrected": ordered.corrected_pairs,
-        "rounds": ordered.rounds,
-        "left": ordered.left,
-        "visible_behind": _behind(ordered.z, visible),
-    }
-    return OrderStage(z=on_plane(ordered.z), counts=counts)
-
-
-def _further_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64], min_gap: float) -> Pairs:
-    """Pair what is stacked elsewhere than at vertices, and what crosses already.
-
-    For a smallest gap, which need not be least at vertices and silhouettes, the grid is a fine one.
-    """
-    grid = grid_pairs(vertices, faces, side=_LINES if min_gap == 0.0 else 4 * _LINES)
-    return Pairs.join([silhouette_pairs(vertices, faces), crossing_pairs(vertices, faces), grid])
-
-
 def on_plane(z: NDArray[np.float64]) -> NDArray[np.float64]:
     """Set onto S what lies within rounding errors of it."""
     return np.where(np.abs(z) < _ON_PLANE, 0.0, z)
 
 
-def _ratios(z: NDArray[np.float64], params: ReliefParams, unit: float) -> tuple[float, float]:
+def ratios(z: NDArray[np.float64], params: ReliefParams, unit: float) -> tuple[float, float]:
     """Return the largest and the smallest compression ratio, 1 and 1 for no compression."""
     alpha, lowest = params.alpha, params.alpha_min
     if params.depth is not None:
@@ -259,7 +197,7 @@ def _ratios(z: NDArray[np.float64], params: ReliefParams, unit: float) -> tuple[
 
 def compression_step(z: NDArray[np.float64], params: ReliefParams, unit: float) -> CompressionStage:
     """Compress the range, to the depth that was asked for."""
-    largest, smallest = _ratios(z, params, unit)
+    largest, smallest = ratios(z, params, unit)
     counts = {} if params.depth is None else {"already_shallower": int(largest == 1.0)}
     if smallest == 1.0:
         return CompressionStage(alpha=np.ones(len(z)), z=z, counts=counts)

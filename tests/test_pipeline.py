@@ -11,6 +11,7 @@ import open3d as o3d
 import pytest
 
 import o3d_relief as rel
+import oracle
 from o3d_relief.records import VisibilityStage
 from shapes import bust, exploded, grid, hills, joined, moved, sphere, to_mesh, turn
 
@@ -144,6 +145,18 @@ def test_paper_s_own_rules_leave_some_behind(mesh):
     assert np.array_equal(solved, stages["restoration"].order_error >= 0.2)
     assert stages["restoration"].counts["visible_behind"] > 0
     assert stages["restoration"].counts["set_on_floor"] == 0
+
+
+@pytest.mark.parametrize("scene", [hills(25), bust(14)])
+def test_paper_is_the_published_method(scene):
+    stages = rel.make_relief(to_mesh(scene), rel.ReliefParams.paper(k=16)).stages
+    shape, points = (stages["scene"].vertices, stages["scene"].faces), stages["attenuation"]
+    built = oracle.construct(shape, points.kept_index, points.kept_height)
+    assert stages["construction"].z == pytest.approx(built, abs=1e-6)
+    high = stages["restoration"].order_error >= 0.2
+    assert high.any()
+    restored = oracle.restore(shape, built, high, 0.9)
+    assert stages["compression"].z == pytest.approx(restored, abs=1e-6)  # and nothing after it
 
 
 def test_x_and_y_stay_where_they_are(relief, mesh):

@@ -93,11 +93,26 @@ def test_moved_turned_and_scaled_scenes_give_the_same_relief(reliefs, data_folde
     )
 
 
-@pytest.mark.parametrize("name", ["bust_igea.ply", "lucy_100k.ply", "bunny_zipper.ply"])
+@pytest.mark.parametrize("name", ["bust_igea.ply", "lucy_100k.ply", "bunny_zipper.ply", "dragon_res2.ply"])
 def test_certificate_of_single_bodies_is_clean(reliefs, name):
     certificate = reliefs(name).certificate
     assert certificate.failures == []
     assert certificate.grid_pairs_tested > 50_000
+
+
+@pytest.mark.parametrize(
+    ("name", "k", "beta"),
+    [
+        ("broken_chair.obj", 64, 0.05),
+        ("robot_steampunk_textured.glb", 64, 0.8),
+        ("bunny_zipper.ply", 16, 0.05),
+    ],
+)
+def test_points_of_awkward_meshes_bend_least(reliefs, data_folder, name, k, beta):
+    params = rel.ReliefParams(k=k, beta=beta)
+    relief = rel.make_relief(rel.read_mesh(data_folder / name), params, view=reliefs(name).view)
+    assert relief.stages["restoration"].stiffness > 0.0
+    assert relief.certificate.failures == []
 
 
 # The second file of igea holds the triangles of the first (tests/scene/test_read.py compares them).

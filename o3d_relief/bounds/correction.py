@@ -58,6 +58,7 @@ class Correction:
         self._reach = np.zeros(len(vertices))
         self._correction = np.zeros(len(vertices))
         self._widening = 1.0
+        self._wide = _AROUND
 
     def solve(
         self,
@@ -98,14 +99,15 @@ class Correction:
         )
         least = np.concatenate([missing, lift[floor]])
         reach = self._reaches(pairs, missing, lift)
-        wide = _AROUND if self._correction.any() else np.inf
         while True:
+            wide = self._wide if self._correction.any() else np.inf
             free = np.flatnonzero(self._concerned(reach, rows, new, wide))
             correction = self._minimum(free, reach[free], rows, least)
             if correction is not None:
                 break
             if np.isfinite(wide):
-                wide = wide * 4.0 if wide < _FURTHEST else np.inf  # what is held around leaves no room
+                # What is held around leaves no room; it rarely leaves more the next time.
+                self._wide = 4.0 * wide if wide < _FURTHEST else np.inf
                 continue
             if (reach > 0.0).all():
                 raise SolverError(

@@ -12,20 +12,20 @@ from numpy.typing import NDArray
 from o3d_relief.bounds.pairs import Pairs
 from o3d_relief.rays import unit_box
 
-__all__ = ["Crossings", "around", "crossing_pairs", "crossings", "edges_of", "new_crossings"]
+__all__ = ["Crossings", "around", "crossings", "edges_of", "new_crossings"]
 
 _DEEP = 1e-3
 """An edge pierces a triangle where it reaches at least this far, in relief units, to both of its sides and,
 seen from the front, away from its border: less is what float32 rays cannot tell from contact."""
+
+_SHALLOW = 1e-4
+"""The same for crossings that are to be mended: what is deepest between two edges is less deep at them."""
 
 _FEW = 500
 """So many crossings at most are looked at together with what is next to them."""
 
 _CLOSE = 0.02
 """Gap in relief units below which surfaces next to a crossing are about to cross, too."""
-
-_HELD = 0.05
-"""Distance in relief units, seen from the front, by which the place of a crossing may move."""
 
 _INSIDE = 1e-4
 """Share at both ends of an edge that does not count as crossing: there it meets its neighbours."""
@@ -59,10 +59,10 @@ class Crossings:
         on_edge = first + self.along * (last - first)
         return np.asarray(on_edge - np.einsum("cek,ck->ce", self.inside, z[self.face]))
 
-    def pierced(self, z: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Find those that cross for the vertex heights z, (c,)."""
+    def pierced(self, z: NDArray[np.float64], *, deep: float = _DEEP) -> NDArray[np.bool_]:
+        """Find those that cross for the vertex heights z, (c,), by more than `deep` to both sides."""
         gaps = self.gaps(z)
-        return np.asarray((gaps.min(axis=1) < -_DEEP) & (gaps.max(axis=1) > _DEEP))
+        return np.asarray((gaps.min(axis=1) < -deep) & (gaps.max(axis=1) > deep))
 
     def heights(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return how high those that cross do so for the vertex heights z, (c,)."""
@@ -145,6 +145,7 @@ def new_crossings(
     before = vertices[:, 2]
     found = crossings(np.column_stack([vertices[:, :2], z]), faces, edges)
     new = found.pierced(z) & ~found.pierced(before)
+    new |= found.pierced(z, deep=_SHALLOW) & ~found.pierced(before, deep=_SHALLOW / 2.0)
     new &= (z[found.face].max(axis=1) > 0.0) & (z[found.edge].max(axis=1) > 0.0)
     found = found.select(new)
     pairs = found.pairs(before, z)
@@ -155,43 +156,6 @@ def new_crossings(
     close = beside.pairs(before, z)
     gap = np.subtract(*close.heights(z))
     return Pairs.join([pairs, close.select(gap < np.minimum(_CLOSE, close.gap / 4.0))]), len(found)
-
-
-def crossing_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Pairs:
-    """Pair what crosses already, a little to both sides of each crossing, so that it stays where it is.
-
-    Parameters
-    ----------
-    vertices : (n, 3) float64
-        In relief units.
-    faces : (m, 3) int64
-
-    Returns
-    -------
-    Pairs
-    """
-    z = vertices[:, 2]
-    found = crossings(vertices, faces, edges_of(faces))
-    found = found.select(found.pierced(z))
-    gap = found.gaps(z)
-    share = gap[:, :1] / (gap[:, :1] - gap[:, 1:])  # of the stretch, where the edge meets the triangle
-    length = np.linalg.norm(vertices[found.edge[:, 1], :2] - vertices[found.edge[:, 0], :2], axis=1)
-    begin, stretch = found.along[:, :1], np.diff(found.along, axis=1)
-    side = _HELD / np.maximum(length[:, None] * stretch, _HELD)
-    sides = np.clip(share + side * [-1.0, 1.0], 0.0, 1.0)
-    inside = found.inside[:, :1] + sides[:, :, None] * np.diff(found.inside, axis=1)
-    corners = np.repeat(found.edge[:, [0, 1, 1]], 2, axis=0), np.repeat(found.face, 2, axis=0)
-    along = (begin + sides * stretch).ravel()
-    weights = np.stack([1.0 - along, along, np.zeros_like(along)], axis=1), inside.reshape(-1, 3)
-    gap = (gap[:, :1] + sides * np.diff(gap, axis=1)).ravel()
-    edge_above = (gap > 0.0)[:, None]
-    return Pairs(
-        upper=np.where(edge_above, *corners),
-        upper_weights=np.where(edge_above, *weights),
-        lower=np.where(edge_above, *corners[::-1]),
-        lower_weights=np.where(edge_above, *weights[::-1]),
-        gap=np.abs(gap),
-    )
 
 
 def edges_of(faces: NDArray[np.int64]) -> NDArray[np.int64]:

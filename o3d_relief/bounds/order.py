@@ -28,6 +28,9 @@ every pair that was ever wrong stays held, so that the rounds come to an end."""
 
 _ROUNDS = 40
 
+_FEW = 500
+"""Pairs out of order on lines up to which edges that pierce triangles are looked for at the same time."""
+
 _CELLS = 256
 """Raster, to each side, on which is looked up what lies above and below what moved."""
 
@@ -130,41 +133,58 @@ def keep_order(
     """
     front = np.zeros(len(z), dtype=bool) if in_front is None else in_front
     system = Correction(vertices, laplacian, areas, z)
-    lines = _Lines(pairs, len(z), min_gap)
-    between, floor = Pairs.join([]), np.zeros(len(z), dtype=bool)
+    lines, between = _Lines(pairs, len(z), min_gap), _BetweenLines(vertices, faces)
+    further, floor = Pairs.join([]), np.zeros(len(z), dtype=bool)
     current, best, fewest, rounds, first = z, z, np.inf, 0, 0
-    near = faces
     while True:
         lines.look_at(current)
         behind = front & (current < 0.0)
-        edges = edges_of(near)
-        crossing, crossed = new_crossings(vertices, near, edges, current)
-        at_foot = foot_pairs(vertices, near, edges, current)
-        left = int(lines.wrong.sum() + behind.sum()) + crossed + len(at_foot)
+        found, left = Pairs.join([]), int(lines.wrong.sum() + behind.sum())
+        # What crosses is mostly out of order on a line as well: while there is much of it, lines will do.
+        if left <= _FEW or rounds == _ROUNDS:
+            found, count = between.look_at(current)
+            left += count
+            if left < fewest:
+                best, fewest = current, left
         first = first or left
         tick(share_of_way(first + 1.0, left + 1.0, 1.0))
-        if left < fewest:
-            best, fewest = current, left
         if left == 0 or rounds == _ROUNDS:
             break
         if rounds < _FORGETFUL:
             lines.let_go(current)
-            between = between.select(~_spare(between, current, min_gap))
-        new = lines.take_worst(current)
+            further = further.select(~_spare(further, current, min_gap))
+        new = Pairs.join([lines.take_worst(current), found])
         touched = behind & ~floor
-        for found in (new, crossing, at_foot):
-            touched[found.upper] = True
-            touched[found.lower] = True
-        between = Pairs.join([between, crossing, at_foot])
+        touched[new.upper] = True
+        touched[new.lower] = True
+        further = Pairs.join([further, found])
         floor |= behind
-        chosen = Pairs.join([lines.held, between])
-        last = current
+        chosen = Pairs.join([lines.held, further])
         current = system.solve(chosen, _wanted_gaps(chosen, min_gap), floor, touched)
         current = np.where(floor, np.maximum(current, 0.0), current)
-        near = faces[_over_or_under(vertices, faces, current != last)]
         rounds += 1
-    held = len(lines.held) + len(between) + int(floor.sum())
+    held = len(lines.held) + len(further) + int(floor.sum())
     return Ordered(z=best, rounds=rounds, corrected_pairs=held, left=int(fewest))
+
+
+class _BetweenLines:
+    """Looks for edges that have begun to pierce triangles, and for what changed places where S cuts it."""
+
+    def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
+        self._vertices, self._faces = vertices, faces
+        self._edges = edges_of(faces)
+        self._last = np.full(len(vertices), np.nan)
+
+    def look_at(self, z: NDArray[np.float64]) -> tuple[Pairs, int]:
+        """Return pairs that keep apart what was found, and how much it was, where something has moved."""
+        near = self._faces[_over_or_under(self._vertices, self._faces, z != self._last)]
+        self._last = z
+        at = np.zeros(len(z), dtype=bool)
+        at[near] = True
+        edges = self._edges[at[self._edges].all(axis=1)]
+        crossing, count = new_crossings(self._vertices, near, edges, z)
+        at_foot = foot_pairs(self._vertices, near, edges, z)
+        return Pairs.join([crossing, at_foot]), count + len(at_foot)
 
 
 class _Lines:

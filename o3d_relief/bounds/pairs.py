@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from o3d_relief.rays import unit_box
 
-__all__ = ["Pairs", "foot_pairs", "grid_pairs", "touching_pairs", "upright", "vertex_pairs"]
+__all__ = ["Pairs", "close_pairs", "foot_pairs", "grid_pairs", "touching_pairs", "upright", "vertex_pairs"]
 
 _SAME_PLACE = 5e-4
 """Points of a line that are closer than this, in relief units, are one: rays are cast in float32."""
@@ -168,22 +168,68 @@ def vertex_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Pai
     faces = faces[~upright(vertices, faces)]
     if len(faces) == 0:
         return Pairs.join([])
+    everything = np.arange(len(vertices))
+    box, borders = _UnitBox(vertices, faces), _Borders(vertices, faces)
+    return Pairs.join(
+        [
+            _next_pairs(vertices, faces, box, borders, everything, 2 * _SAME_PLACE * direction)
+            for direction in (_UP, -_UP)
+        ]
+    )
+
+
+def close_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Pairs:
+    """Pair each vertex with the surfaces that are too close to it for `vertex_pairs`, but do not touch it.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+        In the relief frame, in relief units.
+    faces : (m, 3) int64
+
+    Returns
+    -------
+    Pairs
+        With gaps between 5e-4 and about 1e-3 relief units.
+    """
+    faces = faces[~upright(vertices, faces)]
+    if len(faces) == 0:
+        return Pairs.join([])
     box, borders = _UnitBox(vertices, faces), _Borders(vertices, faces)
     found = []
     for direction in (_UP, -_UP):
-        hits = box.scene.cast_rays(box.rays(vertices + 2 * _SAME_PLACE * direction, direction))
-        hit = np.flatnonzero(hits["primitive_ids"].numpy() != _MISS)
-        triangle = hits["primitive_ids"].numpy()[hit].astype(np.int64)
-        other_weights = _weights(hits["primitive_uvs"].numpy()[hit])
-        # A ray may meet a steep triangle of its own vertex.
-        usable = (faces[triangle] != hit[:, None]).all(axis=1) & ~borders.grazed(triangle, other_weights)
-        hit, other, other_weights = hit[usable], faces[triangle[usable]], other_weights[usable]
-        own, own_weights = _corners(hit)
-        if direction[2] > 0:
-            found.append(_pairs(vertices[:, 2], other, other_weights, own, own_weights))
-        else:
-            found.append(_pairs(vertices[:, 2], own, own_weights, other, other_weights))
+        step = 0.1 * _SAME_PLACE * direction
+        rays = box.rays(vertices + step, direction)
+        reach = 2.2 * _SAME_PLACE / box.size
+        candidates = np.flatnonzero(box.scene.test_occlusions(rays, tfar=reach).numpy())
+        if len(candidates):
+            close = _next_pairs(vertices, faces, box, borders, candidates, step)
+            found.append(close.select((close.gap > _SAME_PLACE) & (close.gap < 2.2 * _SAME_PLACE)))
     return Pairs.join(found)
+
+
+def _next_pairs(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    box: _UnitBox,
+    borders: _Borders,
+    chosen: NDArray[np.int64],
+    step: NDArray[np.float64],
+) -> Pairs:
+    """Pair chosen vertices with the next surface in the direction of a step, from there on."""
+    direction = np.sign(step)
+    hits = box.scene.cast_rays(box.rays(vertices[chosen] + step, direction))
+    met = np.flatnonzero(hits["primitive_ids"].numpy() != _MISS)
+    triangle = hits["primitive_ids"].numpy()[met].astype(np.int64)
+    other_weights = _weights(hits["primitive_uvs"].numpy()[met])
+    hit = chosen[met]
+    # A ray may meet a steep triangle of its own vertex.
+    usable = (faces[triangle] != hit[:, None]).all(axis=1) & ~borders.grazed(triangle, other_weights)
+    hit, other, other_weights = hit[usable], faces[triangle[usable]], other_weights[usable]
+    own, own_weights = _corners(hit)
+    if direction[2] > 0:
+        return _pairs(vertices[:, 2], other, other_weights, own, own_weights)
+    return _pairs(vertices[:, 2], own, own_weights, other, other_weights)
 
 
 def grid_pairs(

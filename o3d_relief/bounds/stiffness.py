@@ -26,6 +26,11 @@ class Stiffness:
     faces : (m, 3) int64
     index : (q,) int64
         The points.
+
+    Attributes
+    ----------
+    within : (n,) bool
+        The vertices of these faces.
     """
 
     def __init__(
@@ -37,6 +42,8 @@ class Stiffness:
         near = distance < _REACH
         weights = (1.0 - (distance[near] / _REACH) ** 2) ** 2
         self._form, _ = cotangent_laplacian(vertices, faces[near], weights=weights)
+        self.within = np.zeros(len(vertices), dtype=bool)
+        self.within[faces[near]] = True
 
     def added_to(self, laplacian: sp.csr_array, factor: float) -> sp.csr_array:
         """Return the Laplacian with each face weighted by 1 + factor (1 - (r / reach)^2)^2.

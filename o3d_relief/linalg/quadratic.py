@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 __all__ = ["minimise"]
 
 _TOLERANCE = 1e-6
+_ITERATIONS = 80
+"""A programme that can be fulfilled takes 20 to 60; the rest are mostly those that cannot."""
+
 _MISSED = 1e-3
 """By how much inequalities may be missed: "almost solved" can be far off."""
 
@@ -55,6 +58,7 @@ def minimise(
     """
     settings = clarabel.DefaultSettings()
     settings.verbose = False
+    settings.max_iter = _ITERATIONS
     settings.direct_solve_method = "qdldl"
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = _TOLERANCE
     solver = clarabel.DefaultSolver(

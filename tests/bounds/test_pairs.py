@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from o3d_relief.bounds.pairs import grid_pairs, touching_pairs, vertex_pairs
+from o3d_relief.bounds.pairs import close_pairs, grid_pairs, touching_pairs, vertex_pairs
 from shapes import bust, grid, joined, moved
 
 
@@ -57,3 +57,12 @@ def test_touching_parts_are_found_whichever_way_they_lie():
     }
     assert met == {(0, 1), (0, 3)}
     assert (pairs.gap <= 0.1).all()
+
+
+@pytest.mark.parametrize(("gap", "there"), [(8e-4, True), (3e-4, False), (3e-3, False)])
+def test_what_is_too_close_for_the_next_surface(gap, there):
+    vertices, faces = joined(grid(9), moved(grid(5, size=33.3), (1.7, 0.9, gap)))
+    pairs = close_pairs(vertices, faces)
+    assert (len(pairs) >= 25) == there  # every vertex of the smaller plate
+    assert pairs.gap == pytest.approx(gap, abs=2e-5)
+    assert (len(vertex_pairs(vertices, faces)) > 0) == (gap > 1e-3)
