@@ -26,10 +26,11 @@ class Screen:
 
     def __init__(self, folder: Path, size: tuple[int, int] = (1280, 1024)) -> None:
         self._folder = folder
+        # -noreset: it would throw out a program that connects while the last other one goes.
         reading, writing = os.pipe()
         self._server = subprocess.Popen(
             ["Xvfb", "-displayfd", str(writing), "-screen", "0", f"{size[0]}x{size[1]}x24",
-             "-fbdir", str(folder), "-nolisten", "tcp", "+extension", "GLX"],
+             "-fbdir", str(folder), "-noreset", "-nolisten", "tcp", "+extension", "GLX"],
             pass_fds=[writing], stderr=subprocess.DEVNULL,
         )  # fmt: skip
         os.close(writing)
@@ -55,18 +56,21 @@ class Screen:
         return blue_green_red[:, :, ::-1].copy()
 
     def settled(
-        self, seconds: float = 90.0, other_than: NDArray[np.uint8] | None = None
+        self,
+        seconds: float = 90.0,
+        other_than: NDArray[np.uint8] | None = None,
+        still_for: float = 1.0,
     ) -> NDArray[np.uint8]:
         """Return what is on the screen as soon as nothing moves for a while, once it is another picture."""
         end = time.monotonic() + seconds
-        last, still = self.picture(), 0
+        last, still = self.picture(), 0.0
         moved = other_than is None
         while time.monotonic() < end:
             time.sleep(0.25)
             now = self.picture()
-            still = still + 1 if np.array_equal(now, last) else 0
+            still = still + 0.25 if np.array_equal(now, last) else 0.0
             moved = moved or not np.array_equal(now, other_than)
-            if moved and still >= 4:
+            if moved and still >= still_for:
                 return now
             last = now
         raise AssertionError("the picture does not come to rest" if moved else "the picture does not change")

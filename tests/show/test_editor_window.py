@@ -26,7 +26,7 @@ params, view = rel.edit(mesh, params, output="relief.ply", size=(700, 800))
 save_params("params.json", params, view)
 """
 # Where the widgets are, in pixels of the window.
-WIDTH = 700
+WIDTH, HEIGHT = 700, 800
 PANEL = WIDTH - 336
 BETA, ALPHA, T1 = 167, 218, 271
 SAVE, ATTACH = (PANEL + 40, 37), (PANEL + 41, 609)
@@ -63,12 +63,13 @@ class Eye:
     def __init__(self, screen):
         self.screen = screen
         self.window = screen.window("o3d-relief edit")
-        shell = screen.do("getwindowgeometry", "--shell", self.window).split()
-        self.left, self.top = (int(word.split("=")[1]) for word in shell[1:3])
         screen.do("windowfocus", self.window)
 
     def halves(self, picture):
-        inside = picture[self.top :, self.left : self.left + WIDTH]
+        # A new window is moved to the middle of the screen.
+        shell = self.screen.do("getwindowgeometry", "--shell", self.window).split()
+        left, top = (int(word.split("=")[1]) for word in shell[1:3])
+        inside = picture[top : top + HEIGHT, left : left + WIDTH]
         return inside[:, :PANEL], inside[:, PANEL:]
 
     def wait(self, what, seconds=150.0):
@@ -76,7 +77,7 @@ class Eye:
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             if what(*self.halves(self.screen.picture())):
-                scene, panel = self.halves(self.screen.settled())
+                scene, panel = self.halves(self.screen.settled(still_for=3.0))  # the preview rests, too
                 if what(scene, panel):
                     return scene, panel
             time.sleep(0.3)
@@ -96,7 +97,7 @@ def red(panel):
 def furnished(scene, _panel):
     """Tell whether the grey plate is there."""
     light = scene.max(axis=2)
-    return ((light > 60) & (light < 140)).mean() > 0.1
+    return ((light > 60) & (light < 140)).mean() > 0.03
 
 
 @pytest.mark.slow
