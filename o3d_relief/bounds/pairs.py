@@ -26,6 +26,9 @@ _UPRIGHT = 0.01
 """Share of its area at which a triangle, seen from the front, counts as upright: there an error of float32 in
 x and y is one of more than 1e-3 relief units in z."""
 
+_BLOCK = 16384
+"""Triangles that are worked on at once."""
+
 _MISS = 0xFFFFFFFF
 
 
@@ -102,25 +105,41 @@ def upright(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[
     (m,) bool
         Those without an area, too.
     """
-    corners = vertices[faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return np.asarray(np.abs(normal[:, 2]) <= _UPRIGHT * np.linalg.norm(normal, axis=1))
+    places, corners = np.ascontiguousarray(vertices.T), np.ascontiguousarray(faces.T)
+    standing = np.zeros(len(faces), dtype=bool)
+    for begin in range(0, len(faces), _BLOCK):
+        a, b, c = corners[:, begin : begin + _BLOCK]
+        (ux, uy, uz), (vx, vy, vz) = (places[:, end] - places[:, a] for end in (b, c))
+        x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        standing[begin : begin + _BLOCK] = np.abs(z) <= _UPRIGHT * np.sqrt(x**2 + y**2 + z**2)
+    return standing
 
 
 class _Borders:
     """The borders of a mesh, seen from the front: a line that grazes one meets the surface by chance."""
 
     def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
-        low, high = np.sort(faces[:, [[1, 2], [2, 0], [0, 1]]], axis=2).reshape(-1, 2).T
-        _, edge, count = np.unique(low * len(vertices) + high, return_inverse=True, return_counts=True)
-        self._on_border = count[edge.ravel()].reshape(-1, 3) == 1
-        at_border = np.zeros(len(vertices), dtype=bool)
-        at_border[np.concatenate([low, high])[np.tile(self._on_border.ravel(), 2)]] = True
+        n = len(vertices)
+        corners = np.ascontiguousarray(faces.T)
+        start, end = corners[[1, 2, 0]], corners[[2, 0, 1]]
+        edge = np.minimum(start, end) * n + np.maximum(start, end)
+        ordered = np.sort(edge, axis=None)
+        alone = np.ones(len(ordered), dtype=bool)
+        same = ordered[1:] == ordered[:-1]
+        alone[1:] &= ~same
+        alone[:-1] &= ~same
+        single = ordered[alone]
+        place = np.minimum(np.searchsorted(single, edge), max(len(single) - 1, 0))
+        self._on_border = single[place].T == edge.T if len(single) else np.zeros(faces.shape, dtype=bool)
+        at_border = np.zeros(n, dtype=bool)
+        at_border[single // n] = True
+        at_border[single % n] = True
         self._corner_on_border = at_border[faces]
-        a, b, c = (vertices[faces[:, i], :2] for i in range(3))
-        area = np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
-        opposite = np.stack([np.linalg.norm(side, axis=1) for side in (c - b, a - c, b - a)], axis=1)
-        self._height = area[:, None] / np.maximum(opposite, np.finfo(np.float64).tiny)
+        x, y = np.ascontiguousarray(vertices[:, :2].T)
+        across, along = x[end] - x[start], y[end] - y[start]
+        area = np.abs(across[0] * along[1] - along[0] * across[1])
+        opposite = np.sqrt(across**2 + along**2)
+        self._height = (area / np.maximum(opposite, np.finfo(np.float64).tiny)).T
 
     def grazed(self, triangle: NDArray[np.int64], weights: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Tell which points of triangles, (q,) and (q, 3), lie on a border, to a rounding error."""

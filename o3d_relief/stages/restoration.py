@@ -19,6 +19,9 @@ _BELOW = 1e-6
 _EXACT = 1e-6
 """Energy norm of the error, in relief units, to which each system is solved."""
 
+_ROUGH = 1e-3
+"""The same while the vertices on the floor are still being found."""
+
 _ROUNDS = 30
 
 
@@ -132,19 +135,20 @@ def _above_floor(
     """Solve subject to z >= floor; return the heights, the vertices on the floor, the rounds."""
     on_floor = np.zeros(len(z), dtype=bool)
     rounds = 0
+    error = _ROUGH if np.isfinite(floor).any() else _EXACT
     while True:
-        result, force = system.solve(original, np.where(on_floor, floor, z), on_floor)
+        result, force = system.solve(original, np.where(on_floor, floor, z), on_floor, error)
         rounds += 1
         below = ~on_floor & (result < floor - _BELOW)
         # A vertex that is pulled towards the floor, not held off it, is let go.
         released = on_floor & (force < 0.0)
-        if not below.any() and not released.any():
-            break
         if rounds > _ROUNDS:
             # The active set goes round in a circle: from here on it only grows, and so comes to an end.
             released[:] = False
-            if not below.any():
+        if not below.any() and not released.any():
+            if error == _EXACT:
                 break
+            error = _EXACT
         on_floor = (on_floor & ~released) | below
     return np.maximum(result, floor), on_floor, rounds
 
@@ -164,7 +168,11 @@ class _System:
         self._displacement = np.zeros(len(rows))
 
     def solve(
-        self, original: NDArray[np.float64], z: NDArray[np.float64], held: NDArray[np.bool_]
+        self,
+        original: NDArray[np.float64],
+        z: NDArray[np.float64],
+        held: NDArray[np.bool_],
+        error: float,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Solve for the rows that are not held; `z` counts everywhere else.
 
@@ -184,7 +192,7 @@ class _System:
             _holding(self._within, moving),
             np.where(moving, -(self._operator @ displacement), 0.0),
             similar=_holding(self._first, moving),
-            error=_EXACT,
+            error=error,
             start=np.where(moving, self._displacement, 0.0),
             tick=self._tick,
         )
