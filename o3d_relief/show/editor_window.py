@@ -69,7 +69,7 @@ class EditorWindow:
         self._said = ""
         self._scene = EditorScene(self._window.renderer)
         self._scene.widget.set_on_mouse(self._mouse)
-        self._news = self._leaving = False
+        self._news, self._leaving = True, False
         self._fresh = self._drawn = 0.0
         self.studio = Studio(mesh, params, view, self._note)
         self._panel = EditorPanel(
@@ -198,10 +198,13 @@ class EditorWindow:
         return results.IGNORED
 
     def _click(self, x: int, y: int, *, add: bool) -> None:
-        sight, place = self.studio.sight, self._scene.place_under(x, y)
+        sight = self.studio.sight
         if sight is None:
             return
-        number = None if place is None else nearest_point(place, sight.points, sight.unit)
+        number = self._scene.ball_under(x, y, sight)
+        place = self._scene.place_under(x, y) if number is None else None
+        if place is not None:
+            number = nearest_point(place, sight.points, sight.unit)
         if number is None:
             self.chosen = []
         else:
