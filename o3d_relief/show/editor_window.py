@@ -115,8 +115,9 @@ class EditorWindow:
         """
         now = time.monotonic()
         if self._leaving:
-            self._window.close()
-            return False
+            self._leaving = False
+            # Not at once: Open3D goes on with the window whose tick this is.
+            self._application.post_to_main_thread(self._window, self._window.close)
         if self._news:
             self._news, self._fresh = False, now
             self._show()
@@ -130,7 +131,7 @@ class EditorWindow:
     def _show(self) -> None:
         sight, work = self.studio.sight, self.studio.work
         if work.failed and sight is None:
-            self._window.close()
+            self.quit()
             return
         if sight is not None and sight.version != self._version:
             self._version = sight.version

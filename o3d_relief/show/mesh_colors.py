@@ -38,7 +38,7 @@ def vertex_colors(mesh: o3d.geometry.TriangleMesh) -> NDArray[np.float64] | None
     --------
     >>> import open3d as o3d
     >>> ball = o3d.geometry.TriangleMesh.create_sphere()
-    >>> vertex_colors(ball) is None, vertex_colors(ball.paint_uniform_color((0, 1, 0)))[0].tolist()
+    >>> vertex_colors(ball) is None, vertex_colors(ball.paint_uniform_color((0, 1, 0)))[0].round(6).tolist()
     (True, [0.0, 1.0, 0.0])
     """
     surface = read_surface(mesh, 0.0)
