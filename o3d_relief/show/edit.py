@@ -124,5 +124,6 @@ def _run(opening: EditorOpening) -> tuple[int, str]:
     finally:
         with contextlib.suppress(BrokenPipeError):
             process.stdin.close()
+        process.stderr.close()
         process.terminate()
         process.wait()

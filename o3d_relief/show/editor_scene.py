@@ -20,6 +20,7 @@ from o3d_relief.show.stage_panels import ACTIONS
 __all__ = ["EditorScene", "nearest_point", "points_within"]
 
 _BALL = 1.3  # relief units
+_REACH = 9.0  # pixels around the middle of a ball
 _FIELD = 30.0  # degrees
 _CHOSEN = (1.0, 1.0, 1.0)
 _BACKGROUND = [0.87, 0.87, 0.865, 1.0]
@@ -106,6 +107,21 @@ class EditorScene:
         distance = float(self._rays.cast_rays(o3d.core.Tensor(ray[None]))["t_hit"].numpy()[0])
         return eye + distance * (ahead - eye) if np.isfinite(distance) else None
 
+    def ball_under(self, x: float, y: float, sight: Sight) -> int | None:
+        """Return the point whose ball lies under a pixel of the widget, None where there is none."""
+        if not len(sight.points.vertex):
+            return None
+        camera, frame = self.widget.scene.camera, self.widget.frame
+        to_screen = np.asarray(camera.get_projection_matrix()) @ np.asarray(camera.get_view_matrix())
+        places = sight.points.new_position / sight.unit
+        seen = np.column_stack([places, np.ones(len(places))]) @ to_screen.T
+        seen = seen[:, :2] / seen[:, 3:]
+        away = np.hypot(
+            (0.5 + 0.5 * seen[:, 0]) * frame.width - x, (0.5 - 0.5 * seen[:, 1]) * frame.height - y
+        )
+        nearest = int(np.argmin(away))
+        return nearest if away[nearest] <= _REACH else None
+
     def _furnish(self, vertices: NDArray[np.float64]) -> None:
         low, high = plate_bounds([vertices.min(axis=0), vertices.max(axis=0)])
         # Right behind S: what lies behind it is to be cut off.
@@ -118,10 +134,13 @@ class EditorScene:
 
 
 def nearest_point(place: NDArray[np.float64], points: EditorPoints, unit: float) -> int | None:
-    """Return the attenuation point nearest to a place (3,) in relief units, None where there is none."""
+    """Return the attenuation point nearest to a place (3,) in relief units, None where there is none.
+
+    Nearest from the front, as the clusters are.
+    """
     if not len(points.vertex):
         return None
-    return int(np.argmin(np.linalg.norm(points.new_position / unit - place, axis=1)))
+    return int(np.argmin(np.linalg.norm(points.new_position[:, :2] / unit - place[:2], axis=1)))
 
 
 def points_within(place: NDArray[np.float64], points: EditorPoints, unit: float, radius: float) -> list[int]:

@@ -69,7 +69,7 @@ class EditorWindow:
         self._said = ""
         self._scene = EditorScene(self._window.renderer)
         self._scene.widget.set_on_mouse(self._mouse)
-        self._news = self._leaving = False
+        self._news, self._leaving = True, False
         self._fresh = self._drawn = 0.0
         self.studio = Studio(mesh, params, view, self._note)
         self._panel = EditorPanel(
@@ -115,8 +115,9 @@ class EditorWindow:
         """
         now = time.monotonic()
         if self._leaving:
-            self._window.close()
-            return False
+            self._leaving = False
+            # Not at once: Open3D goes on with the window whose tick this is.
+            self._application.post_to_main_thread(self._window, self._window.close)
         if self._news:
             self._news, self._fresh = False, now
             self._show()
@@ -130,7 +131,7 @@ class EditorWindow:
     def _show(self) -> None:
         sight, work = self.studio.sight, self.studio.work
         if work.failed and sight is None:
-            self._window.close()
+            self.quit()
             return
         if sight is not None and sight.version != self._version:
             self._version = sight.version
@@ -198,10 +199,13 @@ class EditorWindow:
         return results.IGNORED
 
     def _click(self, x: int, y: int, *, add: bool) -> None:
-        sight, place = self.studio.sight, self._scene.place_under(x, y)
+        sight = self.studio.sight
         if sight is None:
             return
-        number = None if place is None else nearest_point(place, sight.points, sight.unit)
+        number = self._scene.ball_under(x, y, sight)
+        place = self._scene.place_under(x, y) if number is None else None
+        if place is not None:
+            number = nearest_point(place, sight.points, sight.unit)
         if number is None:
             self.chosen = []
         else:

@@ -23,9 +23,9 @@ NONE = EditorPoints(
 )
 
 
-def test_the_nearest_point_in_space():
-    assert nearest_point(np.array([9.0, 4.0, 3.0]), POINTS, UNIT) == 1  # not the one far in front
-    assert nearest_point(np.array([9.0, 4.0, 28.0]), POINTS, UNIT) == 2
+def test_the_nearest_point_goes_by_what_is_seen_from_the_front():
+    assert nearest_point(np.array([9.0, 1.0, 90.0]), POINTS, UNIT) == 1
+    assert nearest_point(np.array([9.0, 4.0, 3.0]), POINTS, UNIT) == 2
     assert nearest_point(np.zeros(3), NONE, UNIT) is None
 
 

@@ -42,17 +42,22 @@ def test_a_script_is_followed_and_goes_on(screen, tmp_path):
         PYTHONPATH=os.environ.get("PYTHONPATH", ""),
     )
     try:
-        program.wait_for("10/10 trim")
-        screen.do("windowfocus", screen.window("o3d-relief"))
-        screen.do("key", "q")
-        shown = program.wait_for("10/10 trim", program.wait_for("went on 10"))
-        screen.do("windowfocus", screen.window("o3d-relief"))
-        screen.do("key", "q")
+        _close(screen, program, 0)
+        shown = program.wait_for("went on 10")
+        _close(screen, program, shown)
         program.wait_for("shown again", shown)
         assert program.process.wait(timeout=60) == 0
     finally:
         program.end()
     assert not any("Error" in line for line in program.lines())
+
+
+def _close(screen, program, after):
+    program.wait_for("1/1 scene", after)
+    screen.do("windowfocus", screen.window("o3d-relief"))
+    program.wait_for("10/10 trim", after)
+    screen.settled()
+    screen.do("key", "q")
 
 
 def test_no_display(monkeypatch):
