@@ -71,8 +71,3 @@ def test_pairs_of_what_touched_stay_on_the_side_they_prefer():
     assert pairs.gap == pytest.approx(0.0)
     upper, lower = pairs.heights(after[:, 2])
     assert (upper - lower).sum() > 0
-
-
-def test_crossings_tell_how_high_they_are():
-    shape = joined(moved(grid(2), (0.0, 0.0, 3.0)), moved(_needle(1.0), (0.0, 0.0, 3.0)))
-    assert _found(shape).heights(shape[0][:, 2]) == pytest.approx(3.0)
