@@ -133,13 +133,16 @@ class _Iteration:
         self.watched = np.zeros(len(bound), dtype=bool)
         self.slack = self._slacks()
         count = len(self.at_lower) + len(self.at_upper)
-        self.barrier = _FIRST_BARRIER * self._energy() / max(count, 1)
+        self.barrier = _FIRST_BARRIER * self._energy(start) / max(count, 1)
         self.force = [self.barrier / slack for slack in self.slack]
         self.rounds = 0
 
-    def _energy(self) -> float:
-        moved = self.x - self.origin
+    def _energy(self, x: Vector) -> float:
+        moved = x - self.origin
         return float(0.5 * (moved @ (self.form @ moved)))
+
+    def _objective(self, x: Vector) -> float:
+        return self._energy(x) - float(self.pull @ x)
 
     def _slacks(self) -> list[Vector]:
         x = self.x
@@ -153,12 +156,11 @@ class _Iteration:
         return [step[self.at_lower], -step[self.at_upper], self.rows @ step]
 
     def run(self, accuracy: float, more_rows: MoreRows) -> Minimum:
-        accepted, share = self.x, np.inf
-        next_check = _CHECK_EVERY
+        accepted, next_check = self.x, _CHECK_EVERY
         while self.rounds < _ROUNDS:
             longest = self._advance()
             gap = self._gap()
-            share = gap / max(self._energy(), 1e-300)
+            share = gap / max(self._energy(self.x), 1e-300)
             close = share <= accuracy
             if close or self.rounds >= next_check:
                 clean = self._go_back(accepted, *more_rows(self.x, accepted))
@@ -166,7 +168,7 @@ class _Iteration:
                     # Back at the rows just found, all may be well already, and almost as good.
                     enough = (1.0 + 2.0 * accuracy) * self._energy_before
                     clean = self._go_back(accepted, *more_rows(self.x, accepted))
-                    close = self._energy() <= enough
+                    close = self._energy(self.x) <= enough
                 if clean:
                     accepted = self.x
                     if close:
@@ -174,14 +176,16 @@ class _Iteration:
                 next_check = self.rounds + _CHECK_EVERY
             shrink = 0.1 if longest > 0.6 else 0.3 if longest > 0.3 else 0.6
             count = len(self.at_lower) + len(self.at_upper) + int(self.watched.sum())
-            self.barrier = max(shrink * gap, 0.1 * accuracy * self._energy()) / count
+            self.barrier = max(shrink * gap, 0.1 * accuracy * self._energy(self.x)) / count
+        above = self._objective(accepted) - self._objective(self.x) + self._gap()
+        share = above / max(self._energy(accepted), 1e-300)
         return Minimum(x=accepted, rounds=self.rounds, watched=int(self.watched.sum()), gap=share)
 
     def _go_back(self, accepted: Vector, rows: sp.csr_array, bound: Vector) -> bool:
         """Add rows, and go back towards what was accepted until there is some room to them; tell if none."""
         if len(bound) == 0:
             return True
-        self._energy_before = self._energy()
+        self._energy_before = self._energy(self.x)
         here, there = rows @ self.x - bound, rows @ accepted - bound
         wanted = _SOME_ROOM * there
         short = here < wanted

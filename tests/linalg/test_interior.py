@@ -91,3 +91,18 @@ def test_rows_that_come_later_are_kept_and_the_last_accepted_point_is_returned()
     assert asked
     assert found.x[0] < 1.0
     assert found.x == pytest.approx([1.0, 0.0], abs=0.05)
+
+
+def test_the_gap_is_that_of_what_is_returned():
+    row = sp.csr_array(np.array([[-1.0, 0.0]]))
+    found = solve(
+        np.eye(2),
+        [3, 0],
+        [0.5, 0.0],
+        upper=[2, 2],
+        lower=[-2, -2],
+        more_rows=lambda _x, _accepted: (row, np.array([-1.0])),  # nothing is ever accepted
+    )
+    assert found.x == pytest.approx([0.5, 0.0])
+    # The objective is -1.375 there, and at least -2.5 where x <= 1; the energy there is 0.125.
+    assert found.gap == pytest.approx((2.5 - 1.375) / 0.125, rel=0.02)
