@@ -134,11 +134,17 @@ def closest_relief(
     between = BetweenLines(vertices, faces)
     added = [0]
 
-    def missed(x: NDArray[np.float64]) -> tuple[sp.csr_array, NDArray[np.float64]]:
+    def missed(
+        x: NDArray[np.float64], accepted: NDArray[np.float64]
+    ) -> tuple[sp.csr_array, NDArray[np.float64]]:
         wrong = between.missed_pairs(place(x))
-        added[0] += len(wrong)
+        there = np.subtract(*wrong.heights(accepted))
+        least = np.minimum(_KEPT_GAP * ratio * wrong.gap, there / 2.0)
         # What touches has no order; it may turn about the point of contact a little.
-        return gap_rows(wrong, n), np.where(wrong.gap > _TOUCH, _KEPT_GAP * ratio * wrong.gap, -_TOUCH / 4.0)
+        least = np.where(wrong.gap > _TOUCH, least, -_TOUCH / 4.0)
+        usable = there > least + _TOUCH / 1000.0
+        added[0] += int(usable.sum())
+        return gap_rows(wrong.select(usable), n), least[usable]
 
     found = minimise(
         hessian,

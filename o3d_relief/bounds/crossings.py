@@ -64,14 +64,6 @@ class Crossings:
         gaps = self.gaps(z)
         return np.asarray((gaps.min(axis=1) < -deep) & (gaps.max(axis=1) > deep))
 
-    def heights(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return how high those that cross do so for the vertex heights z, (c,)."""
-        one, other = self.gaps(z).T
-        share = one / np.where(one == other, 1.0, one - other)
-        at = self.along[:, 0] + share * (self.along[:, 1] - self.along[:, 0])
-        first, last = z[self.edge].T
-        return np.asarray(first + at * (last - first))
-
     def pairs(self, before: NDArray[np.float64], after: NDArray[np.float64]) -> Pairs:
         """Return both ends of the stretches as pairs that were in order before.
 

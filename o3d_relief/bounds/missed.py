@@ -45,7 +45,9 @@ class BetweenLines:
         relief = np.column_stack([self._vertices[:, :2], z])
         met = crossings(relief, self._faces, self._edges)
         new = met.pierced(z) & ~met.pierced(before)
-        found = met.select(new & (met.heights(z) > 0.0)).pairs(before, z)
+        new &= (z[met.face].max(axis=1) > 0.0) & (z[met.edge].max(axis=1) > 0.0)
+        found = met.select(new).pairs(before, z)
+        found = found.select(np.maximum(*found.heights(z)) > 0.0)
         if len(found) == 0:
             stacked = vertex_pairs(relief, self._faces)
             gap = np.subtract(*stacked.heights(before))

@@ -22,14 +22,11 @@ _TO_THE_WALL = 0.98
 _FIRST_BARRIER = 0.3
 """Complementarity at the start, as a share of (x - o)' H (x - o) / 2."""
 
-_LAST_BARRIER = 0.5
-"""Complementarity at the end, as a share of what the accuracy allows: what is held apart keeps some room."""
-
 _CHECK_EVERY = 3
 """Rounds after which further rows are asked for."""
 
 _SOME_ROOM = 0.2
-"""Room that further rows are given at first, as a share of what they have at the start."""
+"""Room that further rows are given, as a share of what they have where they were last fulfilled."""
 
 _WATCHED = 1.6
 """Rows that a step so many times as long would break take part in the next system."""
@@ -40,7 +37,7 @@ _DIRECT_UP_TO = 4000
 _ROUNDS = 60
 
 Vector = NDArray[np.float64]
-MoreRows = Callable[[Vector], tuple[sp.csr_array, Vector]]
+MoreRows = Callable[[Vector, Vector], tuple[sp.csr_array, Vector]]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -81,8 +78,7 @@ def minimise(
 ) -> Minimum:
     """Minimise (x - o)' H (x - o) / 2 - pull' x  subject to  lower <= x <= upper  and  R x >= bound.
 
-    A primal-dual interior point method, whose iterates lie strictly inside all constraints it knows of. Those
-    that become known on the way are moved away first, and come back as the iteration goes on. Each round
+    A primal-dual interior point method, whose iterates lie strictly inside all constraints. Each round
     solves one linear system, H plus springs on the constraints, by conjugate gradients with smoothed
     aggregation multigrid, so that time and memory grow linearly. Of the rows only those that a step has come
     near take part in the systems; all of them limit the steps.
@@ -102,8 +98,9 @@ def minimise(
         R.
     bound : (p,) float64
     more_rows : callable
-        Given an x, returns further rows and bounds that it breaks and `start` fulfils, none when all is well.
-        Asked now and then, and at the end: what it accepted last is returned. `start` counts as accepted.
+        Given an x and one that it has accepted, returns further rows and bounds that the first breaks and the
+        second fulfils, none when all is well. Asked now and then, and at the end: what it accepted last is
+        returned. `start` counts as accepted.
     accuracy : float
         Gap between the objective and its dual, as a share of (x - o)' H (x - o) / 2, at which the iteration
         stops.
@@ -137,11 +134,10 @@ class _Iteration:
     ) -> None:
         self.tick = tick
         self.form, self.pull, self.origin = form, pull, origin
-        self.x, self.start = start, start
+        self.x = start
         self.at_lower, self.at_upper = np.flatnonzero(np.isfinite(lower)), np.flatnonzero(np.isfinite(upper))
         self.lower, self.upper = lower[self.at_lower], upper[self.at_upper]
         self.rows, self.bound = rows, bound
-        self.away = np.zeros(len(bound))
         self.watched = np.zeros(len(bound), dtype=bool)
         self.slack = self._slacks()
         count = len(self.at_lower) + len(self.at_upper)
@@ -153,50 +149,59 @@ class _Iteration:
         moved = x - self.origin
         return float(0.5 * (moved @ (self.form @ moved)))
 
-    def _share(self, x: Vector) -> float:
-        """Bound how far the objective at x is above its minimum, as a share of the energy."""
-        above = self._energy(x) - self._energy(self.x) - float(self.pull @ (x - self.x))
-        return (above + self._gap()) / max(self._energy(x), 1e-300)
+    def _objective(self, x: Vector) -> float:
+        return self._energy(x) - float(self.pull @ x)
 
     def _slacks(self) -> list[Vector]:
         x = self.x
         return [
             x[self.at_lower] - self.lower,
             self.upper - x[self.at_upper],
-            self.rows @ x - self.bound + self.away,
+            self.rows @ x - self.bound,
         ]
 
     def _moves(self, step: Vector) -> list[Vector]:
-        return [step[self.at_lower], -step[self.at_upper], self.rows @ step - self.away]
+        return [step[self.at_lower], -step[self.at_upper], self.rows @ step]
 
     def run(self, accuracy: float, more_rows: MoreRows) -> Minimum:
         accepted, next_check = self.x, _CHECK_EVERY
-        first_share = self._share(self.x)
+        first_share = self._gap() / max(self._energy(self.x), 1e-300)
         while self.rounds < _ROUNDS:
             longest = self._advance()
-            share = self._share(self.x)
+            gap = self._gap()
+            share = gap / max(self._energy(self.x), 1e-300)
             self.tick(share_of_way(first_share, share, accuracy))
             close = share <= accuracy
             if close or self.rounds >= next_check:
-                if self._add(*more_rows(self.x)):
+                clean = self._go_back(accepted, *more_rows(self.x, accepted))
+                if not clean and (close or self.rounds > _ROUNDS // 2):
+                    # Back at the rows just found, all may be well already, and almost as good.
+                    enough = (1.0 + 2.0 * accuracy) * self._energy_before
+                    clean = self._go_back(accepted, *more_rows(self.x, accepted))
+                    close = self._energy(self.x) <= enough
+                if clean:
                     accepted = self.x
                     if close:
                         break
                 next_check = self.rounds + _CHECK_EVERY
             shrink = 0.1 if longest > 0.6 else 0.3 if longest > 0.3 else 0.6
             count = len(self.at_lower) + len(self.at_upper) + int(self.watched.sum())
-            self.barrier = max(shrink * self._gap(), _LAST_BARRIER * accuracy * self._energy(self.x)) / count
-        return Minimum(
-            x=accepted, rounds=self.rounds, watched=int(self.watched.sum()), gap=self._share(accepted)
-        )
+            self.barrier = max(shrink * gap, 0.1 * accuracy * self._energy(self.x)) / count
+        above = self._objective(accepted) - self._objective(self.x) + self._gap()
+        share = above / max(self._energy(accepted), 1e-300)
+        return Minimum(x=accepted, rounds=self.rounds, watched=int(self.watched.sum()), gap=share)
 
-    def _add(self, rows: sp.csr_array, bound: Vector) -> bool:
-        """Add rows, moved away far enough to leave some room to them; tell if there are none."""
+    def _go_back(self, accepted: Vector, rows: sp.csr_array, bound: Vector) -> bool:
+        """Add rows, and go back towards what was accepted until there is some room to them; tell if none."""
         if len(bound) == 0:
             return True
-        here, room = rows @ self.x - bound, _SOME_ROOM * (rows @ self.start - bound)
+        self._energy_before = self._energy(self.x)
+        here, there = rows @ self.x - bound, rows @ accepted - bound
+        wanted = _SOME_ROOM * there
+        short = here < wanted
+        share = float(((wanted - here)[short] / (there - here)[short]).max(initial=0.0))
+        self.x = self.x + share * (accepted - self.x)
         self.rows, self.bound = sp.vstack([self.rows, rows]).tocsr(), np.concatenate([self.bound, bound])
-        self.away = np.concatenate([self.away, np.maximum(room - here, 0.0)])
         self.watched = np.concatenate([self.watched, np.ones(len(bound), dtype=bool)])
         self.slack = self._slacks()
         new = self.barrier / self.slack[2][len(self.force[2]) :]
@@ -236,7 +241,6 @@ class _Iteration:
         )
         dual = min(1.0, _TO_THE_WALL * dual)
         self.x = self.x + length * step
-        self.away = (1.0 - length) * self.away
         self.slack = self._slacks()
         self.force = [force + dual * change for force, change in zip(self.force, changes, strict=True)]
         # What does not take part yet stays on the central path.
@@ -259,7 +263,7 @@ class _Iteration:
         right[self.at_upper] -= push[1]
         if len(some):
             system = system + rows.T @ (sp.diags_array(stiffness[2][some]) @ rows)
-            right = right + rows.T @ (push[2] + stiffness[2] * self.away)[some]
+            right = right + rows.T @ push[2][some]
         self.rounds += 1
         return _solve(system.tocsr(), right, self.tick)
 

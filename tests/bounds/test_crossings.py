@@ -73,11 +73,6 @@ def test_pairs_of_what_touched_stay_on_the_side_they_prefer():
     assert (upper - lower).sum() > 0
 
 
-def test_crossings_tell_how_high_they_are():
-    shape = joined(moved(grid(2), (0.0, 0.0, 3.0)), moved(_needle(1.0), (0.0, 0.0, 3.0)))
-    assert _found(shape).heights(shape[0][:, 2]) == pytest.approx(3.0)
-
-
 def test_new_crossings_bring_along_what_is_about_to_follow():
     before, faces = joined(grid(9), moved(_needle(1.0), (1.0, -20.0, 3.0)))
     z = before[:, 2] - np.where(np.arange(len(before)) < 81, 0.0, 3.0)
