@@ -137,7 +137,8 @@ def new_crossings(
     before = vertices[:, 2]
     found = crossings(np.column_stack([vertices[:, :2], z]), faces, edges)
     new = found.pierced(z) & ~found.pierced(before)
-    new |= found.pierced(z, deep=_SHALLOW) & ~found.pierced(before, deep=_SHALLOW / 2.0)
+    apart = np.abs(found.gaps(before)).max(axis=1) > _DEEP
+    new |= apart & found.pierced(z, deep=_SHALLOW) & ~found.pierced(before, deep=_SHALLOW / 2.0)
     new &= (z[found.face].max(axis=1) > 0.0) & (z[found.edge].max(axis=1) > 0.0)
     found = found.select(new)
     pairs = found.pairs(before, z)
