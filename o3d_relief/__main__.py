@@ -1,8 +1,6 @@
 """python -m o3d_relief: the command."""
 
-import sys
-
-from o3d_relief.cli import main
+from o3d_relief.cli import run
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run()

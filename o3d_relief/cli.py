@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import os
 import signal
 import sys
 import time
 from collections.abc import Sequence
+from typing import NoReturn
 
 from o3d_relief.arguments import parse
 from o3d_relief.batch_command import batch
@@ -17,7 +19,7 @@ from o3d_relief.make_command import make
 from o3d_relief.params import ReliefParams
 from o3d_relief.view_command import view
 
-__all__ = ["main"]
+__all__ = ["main", "run"]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -53,8 +55,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except MemoryError:
         tell("o3d-relief: error: the memory is used up: reduce the mesh, or use a machine with more memory.")
         return 2
-    except (KeyboardInterrupt, ImportError):
-        # An interrupted import of Open3D arrives as an ImportError.
+    except BaseException:
+        # An interrupted import of a compiled library may arrive as any error.
         if not signals:
             raise
         tell("o3d-relief: interrupted; no file is left half-written.")
@@ -62,6 +64,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def run() -> NoReturn:
+    """Run the command and end the process with its exit code."""
+    code = main()
+    if "open3d" not in sys.modules and any(name.startswith("open3d.") for name in sys.modules):
+        # An import that was interrupted leaves memory behind, for which Open3D would end the process with 1.
+        sys.stderr.flush()
+        os._exit(code)
+    sys.exit(code)
 
 
 def _demo(options: argparse.Namespace) -> int:

@@ -30,7 +30,7 @@ def names(folder):
 
 
 def start(scene, output, *words, before=""):
-    code = f"{before}\nfrom o3d_relief.cli import main\nraise SystemExit(main())"
+    code = f"{before}\nfrom o3d_relief.cli import run\nrun()"
     command = [
         sys.executable,
         "-c",
