@@ -113,14 +113,3 @@ def test_points_of_awkward_meshes_bend_least(reliefs, data_folder, name, k, beta
     relief = rel.make_relief(rel.read_mesh(data_folder / name), params, view=reliefs(name).view)
     assert relief.stages["restoration"].stiffness > 0.0
     assert relief.certificate.failures == []
-
-
-# The second file of igea holds the triangles of the first (tests/scene/test_read.py compares them).
-@pytest.mark.parametrize("share", [0.5, 0.25, 0.1, 0.05])
-@pytest.mark.parametrize("name", [name for name in MESHES if "city" not in name and "tristrips" not in name])
-def test_bounded_reliefs_are_as_deep_as_asked_for_and_clean(reliefs, data_folder, name, share):
-    view = reliefs(name).view
-    depth = share * reliefs(name).summary()["scene_visible_depth"]
-    relief = rel.make_relief(rel.read_mesh(data_folder / name), rel.ReliefParams(depth=depth), view=view)
-    assert np.asarray(relief.mesh.vertices)[:, 2].max() == pytest.approx(depth, rel=1e-3)
-    assert relief.certificate.failures == []
