@@ -12,6 +12,7 @@ from o3d_relief.bounds.crossings import crossings, edges_of
 from o3d_relief.bounds.inversions import inversions
 from o3d_relief.bounds.origin import Origin
 from o3d_relief.bounds.pairs import grid_pairs, upright, vertex_pairs
+from o3d_relief.bounds.places import Place, behind_places, crossing_places, told
 
 __all__ = ["Certificate", "certify"]
 
@@ -44,8 +45,10 @@ class Certificate:
         Visible faces within one relief unit of a kept attenuation point, and the others.
     bend_near_points, bend_elsewhere : float
         99th percentile of the angle between their normals in the scene and in the relief, in degrees.
-    places : tuple of (x, y)
-        Where the first few inversions are, in relief units.
+    places : tuple of Place
+        At most ten of each kind of what is counted above on each kind of line, spread over all of them: the
+        surfaces in question, in relief units, and why they are not as they should be, where the relief and
+        its scene tell. Those of kind "old inversion" and "old crossing" are no failures.
     """
 
     visible_tested: int
@@ -65,28 +68,33 @@ class Certificate:
     faces_elsewhere: int
     bend_near_points: float
     bend_elsewhere: float
-    places: tuple[tuple[float, float], ...]
+    places: tuple[Place, ...]
 
     @property
     def failures(self) -> list[str]:
         """One sentence for each thing that does not hold; empty where everything holds."""
-        where = ", ".join(f"({x:.1f}, {y:.1f})" for x, y in self.places)
         found = []
         if self.visible_behind:
             share = f"{self.visible_behind} of {self.visible_tested}"
-            found.append(f"{share} visible vertices lie behind the plane.")
+            found.append(
+                f"{share} visible vertices lie behind the plane, {told(self.places, 'visible behind')}."
+            )
         inverted = self.vertex_inversions + self.grid_inversions
         if inverted:
             tested = self.vertex_pairs_tested + self.grid_pairs_tested
             found.append(
                 f"{inverted} of {tested} pairs of surfaces changed places, by up to "
-                f"{self.worst_inversion:.3f} relief units, for instance at {where}."
+                f"{self.worst_inversion:.3f} relief units, {told(self.places, 'inversion')}."
             )
         if self.gaps_missed:
-            found.append(f"{self.gaps_missed} of {self.gaps_tested} gaps are smaller than asked for.")
+            found.append(
+                f"{self.gaps_missed} of {self.gaps_tested} gaps are smaller than asked for, "
+                f"{told(self.places, 'missed gap')}."
+            )
         if self.new_crossings:
             found.append(
-                f"Edges and triangles cross at {self.new_crossings} places where they did not in the scene."
+                f"Edges and triangles cross at {self.new_crossings} places where they did not in the scene, "
+                f"{told(self.places, 'new crossing')}."
             )
         if self.bend_near_points > self.bend_elsewhere:
             found.append(
@@ -165,5 +173,9 @@ def certify(
         faces_elsewhere=len(elsewhere),
         bend_near_points=float(np.percentile(near, 99)) if len(near) else 0.0,
         bend_elsewhere=float(np.percentile(elsewhere, 99)) if len(elsewhere) else 0.0,
-        places=(both[0].places + both[1].places)[:10],
+        # Lines of the grid come first: they know all that is stacked on them.
+        places=behind_places(scene, heights, visible)
+        + both[1].places
+        + both[0].places
+        + crossing_places(relief, relief_before, met, old, origin),
     )

@@ -100,8 +100,8 @@ class Crossings:
             gap=np.where(edge_above, gap.ravel(), -gap.ravel()),
         )
 
-    def select(self, chosen: NDArray[np.bool_]) -> Crossings:
-        """Return some of them."""
+    def select(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Crossings:
+        """Return some of them, by a mask or by number."""
         return Crossings(
             edge=self.edge[chosen],
             face=self.face[chosen],

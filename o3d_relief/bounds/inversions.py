@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from o3d_relief.bounds.origin import Origin
 from o3d_relief.bounds.pairs import Pairs
+from o3d_relief.bounds.places import Place, few, gap_places, pair_places
 
 __all__ = ["Inversions", "inversions"]
 
@@ -31,8 +32,8 @@ class Inversions:
         How far the worst of those that changed places stood the other way round, in relief units.
     gaps_tested, gaps_missed : int
         Pairs that were at least the asked gap apart in the scene, and those that are not in the relief.
-    places : tuple of (x, y)
-        Where the first few are that changed places.
+    places : tuple of Place
+        Some of those that changed places, that did so but crossed in the scene, and of the missed gaps.
     """
 
     tested: int
@@ -41,7 +42,7 @@ class Inversions:
     worst: float
     gaps_tested: int
     gaps_missed: int
-    places: tuple[tuple[float, float], ...]
+    places: tuple[Place, ...]
 
 
 def inversions(
@@ -77,15 +78,19 @@ def inversions(
     crossed = origin.crossed(pairs.upper[turned], pairs.lower[turned])
     inverted = turned[~crossed]
     wide = gap >= max(min_gap, _SAME)
-    missed = wide & (pairs.gap < min_gap - _SAME)
-    corners = vertices[pairs.upper[inverted[:10]]]
-    middle = np.einsum("pcx,pc->px", corners, pairs.upper_weights[inverted[:10]])
+    missed = np.flatnonzero(wide & (pairs.gap < min_gap - _SAME) & (min_gap > 0.0))
+    known = pairs.select(few(turned[crossed]))
+    places = pair_places("inversion", vertices, pairs.select(few(inverted)), origin)
+    places += pair_places("old inversion", vertices, known, origin, crossed=True)
+    if len(missed):
+        close, asked = pairs.select(few(missed)), pairs.select(wide)
+        places += gap_places(vertices, before, close, asked, origin, min_gap=min_gap)
     return Inversions(
         tested=len(pairs),
         inverted=len(inverted),
         crossed=int(crossed.sum()),
         worst=float(np.abs(gap[inverted]).max(initial=0.0)),
         gaps_tested=int(wide.sum()),
-        gaps_missed=int(missed.sum()) if min_gap > 0.0 else 0,
-        places=tuple((float(x), float(y)) for x, y, _ in middle),
+        gaps_missed=len(missed),
+        places=places,
     )

@@ -43,17 +43,38 @@ class Origin:
         (q,) bool
             True where a triangle at the one place crossed a triangle at the other.
         """
+        row, a, b = self._combined(one, other)
+        found = triangles_cross(self._corners[a], self._corners[b])
+        return np.bincount(row, weights=found, minlength=len(one)) > 0
+
+    def meet(self, one: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Tell whether triangles around two places of the relief share a vertex.
+
+        Parameters
+        ----------
+        one, other : (q, 3) int64
+            As in `crossed`.
+
+        Returns
+        -------
+        (q,) bool
+        """
+        row, a, b = self._combined(one, other)
+        found = (self._faces[a][:, :, None] == self._faces[b][:, None, :]).any(axis=(1, 2))
+        return np.bincount(row, weights=found, minlength=len(one)) > 0
+
+    def _combined(
+        self, one: NDArray[np.int64], other: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+        """Return all combinations of the triangles at both places: number of the query, both triangles."""
         query, first = self._at(one)
         second_query, second = self._at(other)
-        # All combinations of the triangles at both places of a query.
         count = np.bincount(second_query, minlength=len(one))
         begin = np.cumsum(count) - count
         times = count[query]
         row = np.repeat(np.arange(len(query)), times)
         within = np.arange(len(row)) - np.repeat(np.cumsum(times) - times, times)
-        a, b = first[row], second[begin[query[row]] + within]
-        found = triangles_cross(self._corners[a], self._corners[b])
-        return np.bincount(query[row], weights=found, minlength=len(one)) > 0
+        return query[row], first[row], second[begin[query[row]] + within]
 
     def _at(self, places: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Return the triangles that hold all vertices of each place: numbers of places, rising, and faces."""

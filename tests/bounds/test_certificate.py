@@ -1,3 +1,5 @@
+import json
+
 import numpy as np
 import open3d as o3d
 import pytest
@@ -59,6 +61,10 @@ def test_without_the_guarantees_the_certificate_says_what_is_wrong():
     assert paper.grid_inversions > 1000
     assert paper.visible_behind > 0
     assert any("changed places" in sentence for sentence in paper.failures)
+    assert max(max(abs(place.x), abs(place.y)) for place in paper.places) <= 50
+    behind = [place for place in paper.places if place.kind == "visible behind"]
+    assert len(behind) == min(10, paper.visible_behind)
+    assert all(place.upper < 0.0 for place in behind)
 
 
 def test_minimum_gap_survives_compression():
@@ -67,3 +73,40 @@ def test_minimum_gap_survives_compression():
     certificate = rel.make_relief(scene, params).certificate
     assert certificate.gaps_tested > 1000
     assert certificate.gaps_missed == 0
+
+
+def _plates(*, leaning=0.0):
+    """Four plates in front of a large one; the frontmost may lean through the one behind it."""
+    plates = [moved(grid(9, size=50), (0, 0, z)) for z in (10, 20, 30)]
+    vertices, faces = moved(grid(8, size=44), (0, 0, 40))
+    vertices[:, 2] += leaning * vertices[:, 0]
+    return to_mesh(joined(grid(31), *plates, (vertices, faces)))
+
+
+def test_contradicting_gaps_are_named_with_the_reason():
+    params = rel.ReliefParams(depth=20.0, min_gap=7.0)
+    relief = rel.make_relief(_plates(), params)
+    certificate = relief.certificate
+    assert certificate.gaps_missed > 1000
+    (sentence,) = certificate.failures  # the large plate is hidden there, and cut off
+    assert "the gaps asked for there, 3 x 7 = 21, do not fit into the relief's depth of 20" in sentence
+    on_grid = certificate.places[:10]
+    assert all(abs(place.x) <= 25.1 and abs(place.y) <= 25.1 for place in on_grid)
+    assert all(0.0 < place.upper - place.lower < 7.0 for place in on_grid)
+    written = json.loads(json.dumps(relief.report()))["certificate"]
+    assert written["places"][0]["kind"] == "missed gap"
+    assert "do not fit" in written["places"][0]["reason"]
+    assert "do not fit" in written["failures"][0]
+
+
+def test_what_crossed_in_the_scene_is_listed_and_no_failure():
+    relief = rel.make_relief(_plates(leaning=0.6), rel.ReliefParams(k=16))
+    certificate = relief.certificate
+    assert certificate.failures == []
+    assert certificate.old_crossings > 0
+    old = [place for place in certificate.places if place.kind == "old crossing"]
+    assert len(old) == min(10, certificate.old_crossings)
+    for place in old:
+        assert place.reason == "they crossed in the scene already"
+        assert place.x == pytest.approx(-10 / 0.6, abs=1.0)  # where 40 + 0.6 x is 30
+        assert place.lower == place.upper > 0.0

@@ -20,7 +20,9 @@ def test_swapped_plates_are_inverted_and_others_are_not():
         assert found.inverted == found.tested > 0
         assert found.crossed == 0
         assert found.worst == pytest.approx(10.0, abs=1e-3)
-        assert all(abs(x) <= 20 and abs(y) <= 20 for x, y in found.places)
+        assert len(found.places) == 10
+        assert all(abs(place.x) <= 20 and abs(place.y) <= 20 for place in found.places)
+        assert {place.kind for place in found.places} == {"inversion"}
         assert inversions(relief, pairs, relief[:, 2], origin).inverted == 0
 
 
@@ -33,6 +35,7 @@ def test_what_crossed_in_the_scene_does_not_count():
     found = inversions(relief, pairs, scene[:, 2], Origin(faces, faces, scene))
     assert found.inverted == 0
     assert found.crossed == len(pairs) > 100
+    assert {place.kind for place in found.places} == {"old inversion"}
 
 
 def test_gaps_that_became_too_small_are_counted():
