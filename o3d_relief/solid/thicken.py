@@ -56,8 +56,9 @@ def shells(piece: Piece, thickness: float, *, leave_room: bool = True) -> list[P
         part, used = piece.only(rows), np.unique(piece.faces[rows])
         # Neighbouring charts go back in the same direction, so that nothing gapes between them, but where
         # the surface folds so sharply that there is no such direction.
-        own, _ = _offsets(part)
-        offset = np.where(sharpness[used, None] < _FOLD, own, shared[used])
+        offset, folded = shared[used], sharpness[used] < _FOLD
+        if folded.any():
+            offset = np.where(folded[:, None], _offsets(part)[0], offset)
         result.append(_shell(part, depth[used, None] * offset))
     return result
 

@@ -59,6 +59,32 @@ def test_a_mixed_patch_is_turned_outward():
     assert turned == half.sum()
 
 
+def test_a_patch_of_many_faces_is_turned_outward_by_some_of_them():
+    from trimesh.creation import icosphere
+
+    # A hollow ball, seen from inside but for one face: few rays from its inside get away through the hole.
+    mesh = icosphere(subdivisions=5, radius=10.0)
+    faces = np.array(mesh.faces)[mesh.triangles_center[:, 2] < 8.0]
+    inward = faces[:, ::-1].copy()
+    inward[7] = faces[7]
+    piece, turned = oriented(_piece(np.array(mesh.vertices), inward))
+    assert len(faces) > 4 * 2048
+    assert turned == len(faces) - 1
+    assert np.array_equal(piece.faces, faces)
+
+
+@pytest.mark.parametrize(("bend", "turned"), [(2e-3, -1), (-2e-3, 1)])
+def test_the_outside_of_a_sheet_is_its_hill(bend, turned):
+    # Nearly as free on both sides.
+    vertices, faces = sheet(lambda x, y: 5 + bend * x**2, count=100)
+    mixed = np.array(faces)
+    mixed[-1] = mixed[-1, ::-1]
+    piece, count = oriented(_piece(vertices, mixed))
+    assert len(faces) > 4 * 2048
+    assert count == turned % len(faces)
+    assert np.array_equal(piece.faces, faces if turned == 1 else np.array(faces)[:, ::-1])
+
+
 def test_a_moebius_strip_stays_as_it_is():
     around = np.arange(24)
     angle = 2 * np.pi * around / 24
