@@ -21,6 +21,11 @@ def missing() -> list[str]:
     return [package for program, package in _PROGRAMS.items() if shutil.which(program) is None]
 
 
+def _alike(first: NDArray[np.uint8], second: NDArray[np.uint8]) -> bool:
+    """Tell whether nothing moves; what is drawn again and again while a button is down has a little noise."""
+    return int((np.abs(first.astype(np.int16) - second) > 8).any(axis=2).sum()) < 200
+
+
 class Screen:
     """An X server that draws into memory."""
 
@@ -68,7 +73,7 @@ class Screen:
         while time.monotonic() < end:
             time.sleep(0.25)
             now = self.picture()
-            still = still + 0.25 if np.array_equal(now, last) else 0.0
+            still = still + 0.25 if _alike(now, last) else 0.0
             moved = moved or not np.array_equal(now, other_than)
             if moved and still >= still_for:
                 return now
@@ -93,11 +98,12 @@ class Screen:
         self.do("mousemove", "--window", window, *start)
         self.settled()
         self.do("mousedown", 1)
-        self.settled()
+        now = self.settled()
         for part in (0.5, 1.0) if end != start else ():
             place = (round(a + part * (b - a)) for a, b in zip(start, end, strict=True))
             self.do("mousemove", "--window", window, *place)
-            self.settled()
+            # A busy window would take all of a drag as one: it has to show each part of it.
+            now = self.settled(other_than=now)
         self.do("mouseup", 1)
 
     def window(self, title: str, seconds: float = 120.0) -> int:

@@ -133,7 +133,10 @@ def test_morph_and_blink_move_by_themselves(screen, run):
     frames = _frames(screen, seconds=4.0)
     kinds = {changed(one, built) > 0.02 for one in frames}
     assert kinds == {True, False}  # both surfaces have been seen
-    assert np.array_equal(hand.press("b", "6/10 construction"), built)
+    before = len(run.lines())
+    screen.do("key", "b")
+    run.wait_for("6/10 construction", before)
+    assert np.array_equal(screen.settled(), built)
 
 
 def _frames(screen, seconds):
