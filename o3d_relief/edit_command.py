@@ -9,6 +9,7 @@ from o3d_relief.console import tell, tell_stage
 from o3d_relief.errors import MeshError
 from o3d_relief.files import check_exists
 from o3d_relief.make_command import read_scene
+from o3d_relief.params import ReliefParams, View
 from o3d_relief.scan_arguments import chosen_scan
 from o3d_relief.show.display import require_display, require_vulkan
 
@@ -54,6 +55,17 @@ def edit(options: argparse.Namespace) -> int:
         )
     except MeshError as error:
         raise MeshError(f"{options.input}: {error}") from error
-    edits = len(params.point_edits)
-    tell(f"closed with k {params.k}, beta {params.beta}, alpha {params.alpha}, {edits} points edited by hand")
+    tell(f"closed with {_words(params, eye)}")
     return 0
+
+
+def _words(params: ReliefParams, eye: View) -> str:
+    """Name what counts in the mode that was chosen last."""
+    if params.depth is not None and params.bounded:
+        words = f"the closest relief of depth {params.depth:g}"
+    else:
+        edits = len(params.point_edits)
+        points = "1 point" if edits == 1 else f"{edits} points"
+        squeezed = f"alpha {params.alpha}" if params.depth is None else f"depth {params.depth:g}"
+        words = f"k {params.k}, beta {params.beta}, {squeezed}, {points} edited by hand"
+    return words if eye.vanishing_point is None else f"{words}, vanishing point {eye.vanishing_point}"

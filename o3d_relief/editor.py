@@ -18,7 +18,7 @@ from o3d_relief.params import ReliefParams, View
 from o3d_relief.params_file import load_params, save_params
 from o3d_relief.pipeline import Relief, make_relief
 from o3d_relief.point_edits import PointEdit, merged
-from o3d_relief.progress import OnProgress
+from o3d_relief.progress import OnProgress, Progress
 from o3d_relief.records import AttenuationStage
 
 __all__ = ["EditorPoints", "ReliefEditor"]
@@ -73,11 +73,16 @@ class ReliefEditor:
         Not changed; the editor keeps a copy.
     params : ReliefParams, optional
     view : View, optional
+    on_progress : callable, optional
+        Told how far the beginning is, and a change that takes as long, see `make_relief`. Where it returns
+        False the work ends with `Cancelled`, and everything stays as it was.
 
     Raises
     ------
     MeshError, ParameterError, SolverError
         As `make_relief`.
+    Cancelled
+        `on_progress` returned False.
 
     Examples
     --------
@@ -96,6 +101,7 @@ class ReliefEditor:
         params: ReliefParams | None = None,
         *,
         view: View | None = None,
+        on_progress: OnProgress | None = None,
     ) -> None:
         if not isinstance(mesh, o3d.geometry.TriangleMesh):
             raise MeshError(
@@ -111,19 +117,22 @@ class ReliefEditor:
         self._first = params, view
         self._before: list[tuple[ReliefParams, View]] = []
         self._after: list[tuple[ReliefParams, View]] = []
-        self._scene = LiveScene(self._mesh, params, view)
+        self._progress = Progress(on_progress)
+        self._scene = LiveScene(self._mesh, params, view, self._progress)
         self._live: LivePoints | None = None
         self._show(params, view)
 
     def _show(self, params: ReliefParams, view: View) -> None:
         """Go to other parameters; where that fails, everything stays as it was."""
-        scene = self._scene if view == self._scene.view else LiveScene(self._mesh, params, view)
+        scene = self._scene
+        if view != scene.view:
+            scene = LiveScene(self._mesh, params, view, self._progress)
         live, points = self._live, None
         if params.bounded:
             heights = scene.scaled(params)
         else:
             if live is None or not live.serve(scene, params):
-                live = LivePoints(scene, params)
+                live = LivePoints(scene, params, self._progress)
             points, heights = live.preview(params)
         heights.flags.writeable = False
         self._scene, self._live, self._params = scene, live, params

@@ -12,6 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from o3d_relief.bounds.parts import PartSprings
 from o3d_relief.linalg.factor import Factor
 from o3d_relief.linalg.responses import Responses
+from o3d_relief.progress import Tick, silent
 from o3d_relief.stages.construction import leaders
 
 __all__ = ["LiveConstruction"]
@@ -77,6 +78,8 @@ class LiveConstruction:
         The attenuation points.
     springs : PartSprings or None
         What ties the parts of a scene, if anything does.
+    tick : callable
+        Called with the share of the responses that is done; may call the work off.
 
     Raises
     ------
@@ -90,7 +93,9 @@ class LiveConstruction:
         laplacian: sp.csr_array,
         index: NDArray[np.int64],
         springs: PartSprings | None,
+        tick: Tick = silent,
     ) -> None:
+        self._tick = tick
         self._vertices = vertices
         self._laplacian = laplacian
         self._index = index
@@ -203,7 +208,7 @@ class LiveConstruction:
         index = self._index[points]
         free = np.isin(self._label, self._label[index])
         free[index] = False
-        return Responses(form, self._vertices, index, free, keep_factor=keep_factor)
+        return Responses(form, self._vertices, index, free, keep_factor=keep_factor, tick=self._tick)
 
 
 def _spread(columns: sp.csr_array, chosen: NDArray[np.bool_]) -> sp.csr_array:

@@ -18,6 +18,7 @@ from o3d_relief.linalg.laplacian import cotangent_laplacian
 from o3d_relief.live_construction import LiveConstruction
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.point_edits import PointEdit
+from o3d_relief.progress import Progress
 from o3d_relief.records import AttenuationStage
 from o3d_relief.scene.convert import mesh_arrays
 from o3d_relief.stages.attenuation import attenuate
@@ -33,6 +34,8 @@ from o3d_relief.steps import (
 
 __all__ = ["LivePoints", "LiveScene"]
 
+_NOBODY = Progress(None)
+
 
 class LiveScene:
     """The scene from one view: what no other parameter changes.
@@ -42,6 +45,8 @@ class LiveScene:
     mesh : open3d.geometry.TriangleMesh
     params : ReliefParams
     view : View
+    progress : Progress
+        Told of the stages; may call the work off.
 
     Raises
     ------
@@ -49,13 +54,22 @@ class LiveScene:
         As `make_relief`.
     """
 
-    def __init__(self, mesh: o3d.geometry.TriangleMesh, params: ReliefParams, view: View) -> None:
+    def __init__(
+        self,
+        mesh: o3d.geometry.TriangleMesh,
+        params: ReliefParams,
+        view: View,
+        progress: Progress = _NOBODY,
+    ) -> None:
+        progress.begin("scene")
         in_vertices, in_faces = mesh_arrays(mesh)
         self.view = view
         self.frame = frame_step(in_vertices, in_faces, view)
         self.scene = scene_step(in_vertices, in_faces, self.frame, params)
         self.vertices = perspective_step(self.scene.vertices, view).vertices
+        progress.begin("visibility")
         self.visible = visibility_step(self.vertices, self.scene.faces, view).visible
+        progress.begin("weights")
         self.laplacian, _ = cotangent_laplacian(self.vertices, self.scene.faces)
         self.parts = int(connected_components(self.laplacian, directed=False, return_labels=False))
 
@@ -87,6 +101,8 @@ class LivePoints:
     ----------
     scene : LiveScene
     params : ReliefParams
+    progress : Progress
+        Told of the stages; may call the work off, in `preview`, too.
 
     Raises
     ------
@@ -96,16 +112,19 @@ class LivePoints:
         A system is singular.
     """
 
-    def __init__(self, scene: LiveScene, params: ReliefParams) -> None:
+    def __init__(self, scene: LiveScene, params: ReliefParams, progress: Progress = _NOBODY) -> None:
         check_k(params, len(scene.vertices))
+        progress.begin("clusters")
         self.scene = scene
         self._key = self._needs(params)
         self._clusters = clusters_step(scene.vertices, params)
         self._chosen = chosen_points(scene.vertices, scene.visible, self._clusters)
         self._springs = scene.springs if params.in_order else None
+        progress.begin("responses")
         self._construction = LiveConstruction(
-            scene.vertices, scene.laplacian, self._chosen.index, self._springs
+            scene.vertices, scene.laplacian, self._chosen.index, self._springs, progress.tick
         )
+        progress.end()
 
     def _needs(self, params: ReliefParams) -> tuple[int, int, bool]:
         return params.k, params.seed, params.in_order and self.scene.parts > 1

@@ -4,6 +4,7 @@ import pytest
 import scipy.sparse.linalg as sla
 
 from o3d_relief import (
+    Cancelled,
     MeshError,
     ParameterError,
     PointEdit,
@@ -252,6 +253,34 @@ def test_errors_leave_everything_as_it_was(mesh, editor):
         assert editor.heights is heights
     assert editor.undo()
     assert not editor.undo()
+
+
+def test_a_long_change_is_told_of_and_called_off(mesh):
+    told, stop = [], []
+
+    def watch(stage, share):
+        told.append((stage, share))
+        return stage not in stop
+
+    editor = ReliefEditor(mesh, ReliefParams(k=K), on_progress=watch)
+    stages = list(dict.fromkeys(stage for stage, _ in told))
+    assert stages == ["scene", "visibility", "weights", "clusters", "responses"]
+    assert told[-1] == ("responses", 1.0)
+
+    heights, told[:] = editor.heights, []
+    editor.change(beta=0.3)
+    assert not told  # at once
+    editor.undo()
+    for stage, change in (("responses", {"k": 9}), ("visibility", {"view": View(front="y", up="z")})):
+        stop[:] = [stage]
+        with pytest.raises(Cancelled, match=f"called off, in the stage {stage}"):
+            editor.change(**change)
+        assert (editor.params.k, editor.view) == (K, View())
+        np.testing.assert_array_equal(editor.heights, heights)
+    stop.clear()
+    assert editor.redo()  # what is called off has not been a change
+    editor.change(k=9)
+    _assert_right(editor, mesh)
 
 
 def test_what_the_editor_takes(mesh):

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from o3d_relief.linalg.factor import Factor
+from o3d_relief.progress import Tick, silent
 
 __all__ = ["Responses"]
 
@@ -43,6 +44,8 @@ class Responses:
         The vertices that are solved for, the points not among them; all others do not move.
     keep_factor : bool
         Allow for right-hand sides.
+    tick : callable
+        Called with the share that is done; may call the work off.
 
     Raises
     ------
@@ -58,6 +61,7 @@ class Responses:
         free: NDArray[np.bool_],
         *,
         keep_factor: bool = False,
+        tick: Tick = silent,
     ) -> None:
         self._count = len(positions)
         self._index = index
@@ -74,6 +78,7 @@ class Responses:
         near = np.unique(pulls.indices)
         coupling = self._point_rows[:, self._free[near]]
         for start in range(0, len(index), _BLOCK):
+            tick(start / len(index))
             block = slice(start, start + _BLOCK)
             solved = factor.solve_ordered(pulls[:, block].toarray(order="F"))
             self._weights[:, block] = solved

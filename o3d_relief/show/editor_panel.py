@@ -25,6 +25,7 @@ _SLIDERS = {
     "discard_above": ("t1: discard above", (0.0, 1.0)),
     "attach_below": ("t2: attach below", (0.0, 1.0)),
 }
+_NEWS, _WRONG = gui.Color(0.85, 0.85, 0.85), gui.Color(0.95, 0.45, 0.35)
 _RADIUS = 8.0  # of the brush, in relief units
 
 
@@ -119,7 +120,6 @@ class EditorPanel:
         self._column.row(("Cancel", self._studio.cancel))
         self._doing = self._column.add(gui.Label(""))
         self._sentence = self._column.add(gui.Label(""))
-        self._sentence.text_color = gui.Color(0.95, 0.45, 0.35)
 
     # What they ask for.
 
@@ -231,3 +231,4 @@ class EditorPanel:
         rest = "the finished relief" if final else "a preview"
         self._doing.text = f"computing: {work.doing}{share}" if work.doing else rest
         self._sentence.text = "\n".join(textwrap.wrap(work.sentence, 40))
+        self._sentence.text_color = _WRONG if work.wrong else _NEWS

@@ -85,6 +85,8 @@ class Work:
         How much of it is done.
     sentence : str
         The last thing that went wrong or is to be told, empty after a change that went well.
+    wrong : bool
+        Whether the sentence tells of something that went wrong.
     failed : bool
         Whether the editor could not be opened at all, or broke.
     """
@@ -92,4 +94,5 @@ class Work:
     doing: str = ""
     share: float | None = None
     sentence: str = ""
+    wrong: bool = False
     failed: bool = False

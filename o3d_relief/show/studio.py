@@ -77,6 +77,7 @@ class Studio:
         self._rest, self._finishing = rest, finishing
         self._change = threading.Condition()
         self._requests: list[_Request] = []
+        self._now: _Request | None = None
         self._last = ("", 0.0)
         self._number = count()
         self._called_off = self._closed = False
@@ -187,7 +188,7 @@ class Studio:
     def _live(self) -> None:
         mesh, params, view = self._first
         try:
-            editor = ReliefEditor(mesh, params, view=view)
+            editor = ReliefEditor(mesh, params, view=view, on_progress=self._watch_change)
         except (ReliefError, MemoryError) as error:
             self._tell(sentence=_sentence(error), failed=True)
             return
@@ -225,24 +226,20 @@ class Studio:
     def _carry_out(self, editor: ReliefEditor, request: _Request) -> None:
         name, when = self._last
         continued = name == request.name and time.monotonic() - when < _GOES_ON
-        before = editor.params, editor.view
+        self._now = request
         self._tell(doing=request.doing)
         try:
             request.act(editor, continued)
         except Cancelled:
-            self._tell(sentence="called off")
+            self._tell(sentence="called off" if self._called_off else None)
             return
         except (ReliefError, MemoryError) as error:
-            self._tell(sentence=_sentence(error))
+            self._tell(sentence=_sentence(error), wrong=True)
             return
         if not request.changes:
             self._tell()
             return
         self._last = request.name, time.monotonic()
-        if self._called_off and not self._closed and (editor.params, editor.view) != before:
-            editor.undo()
-            self._tell(sentence="called off")
-            return
         self._relief, self._unfinished = None, True
         self._show(editor, sentence="")
 
@@ -260,6 +257,19 @@ class Studio:
             self._called_off = False
             self._relief = self._editor.relief(on_progress=self._watch)
         return self._relief
+
+    def _watch_change(self, stage: str, share: float | None) -> bool:
+        """Tell how far a change is; call it off where asked to, or where a newer one makes it void."""
+        if self._now is None:  # the beginning, without which there is nothing
+            if not self._closed:
+                self._tell(doing=stage, share=share)
+            return not self._closed
+        with self._change:
+            void = any(request.name == self._now.name for request in self._requests)
+        if void or self._called_off:
+            return False
+        self._tell(doing=stage, share=share)
+        return True
 
     def _watch(self, stage: str, share: float | None) -> bool:
         """Tell how far the relief is; call it off where somebody wants something else."""
@@ -288,11 +298,13 @@ class Studio:
         doing: str = "",
         share: float | None = None,
         sentence: str | None = None,
+        wrong: bool = False,
         failed: bool = False,
     ) -> None:
         """Tell what goes on; where no sentence is given the last one stays."""
-        words = self.work.sentence if sentence is None else sentence
-        self.work = Work(doing=doing, share=share, sentence=words, failed=failed)
+        if sentence is None:
+            sentence, wrong = self.work.sentence, self.work.wrong
+        self.work = Work(doing=doing, share=share, sentence=sentence, wrong=wrong or failed, failed=failed)
         with self._change:
             news = self._on_news
         if news is not None:

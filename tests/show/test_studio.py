@@ -130,6 +130,10 @@ def test_a_file_that_cannot_be_written_is_told(gallery, tmp_path):
     gallery.studio.save_params(tmp_path / "missing" / "params.json")
     gallery.wait(lambda studio: "is missing" in studio.work.sentence)
     assert gallery.studio.sight.final
+    assert gallery.studio.work.wrong
+    gallery.studio.save_params(tmp_path / "params.json")
+    gallery.wait(lambda studio: studio.work.sentence.startswith("saved"))
+    assert not gallery.studio.work.wrong
 
 
 @pytest.mark.parametrize("gallery", [{"params": ReliefParams(k=10)}], indirect=True)
@@ -142,6 +146,43 @@ def test_cancelled_the_preview_stays(gallery):
     assert not gallery.studio.work.doing
     gallery.studio.change("beta", beta=0.1)
     gallery.wait(lambda studio: studio.work.doing == "order")
+
+
+def _slow_change(gallery, monkeypatch, then):
+    """Ask for another k; do something as soon as its responses are computed."""
+    gallery.wait(rested)
+    note = gallery._note
+
+    def watched():
+        note()
+        if gallery.studio.work.doing == "responses" and not gallery.studio.waiting:
+            then()
+
+    monkeypatch.setattr(gallery.studio, "_on_news", watched)
+    gallery.studio.change("k", slow=True, k=11)
+
+
+def test_a_slow_change_is_called_off(gallery, monkeypatch):
+    _slow_change(gallery, monkeypatch, gallery.studio.cancel)
+    gallery.wait(lambda studio: studio.work.sentence == "called off")
+    assert gallery.studio.sight.params.k == 10
+    assert not gallery.studio.work.wrong
+
+
+def test_a_slow_change_gives_way_to_the_next_of_its_kind(gallery, monkeypatch):
+    again = []
+
+    def then():
+        if not again:
+            again.append(True)
+            gallery.studio.change("k", slow=True, k=12)
+
+    _slow_change(gallery, monkeypatch, then)
+    gallery.wait(lambda studio: studio.sight.params.k == 12)
+    assert {sight.params.k for sight, _ in gallery.told if sight is not None} == {10, 12}
+    assert not gallery.studio.work.sentence
+    gallery.studio.undo()
+    gallery.wait(lambda studio: studio.sight.params.k == 10)
 
 
 @pytest.mark.parametrize("gallery", [{"params": ReliefParams(k=10)}], indirect=True)

@@ -42,22 +42,23 @@ def test_a_script_is_followed_and_goes_on(screen, tmp_path):
         PYTHONPATH=os.environ.get("PYTHONPATH", ""),
     )
     try:
-        _close(screen, program, 0)
-        shown = program.wait_for("went on 10")
-        _close(screen, program, shown)
-        program.wait_for("shown again", shown)
+        shown = _close(screen, program, 0, "went on 10")
+        _close(screen, program, shown, "shown again")
         assert program.process.wait(timeout=60) == 0
     finally:
         program.end()
     assert not any("Error" in line for line in program.lines())
 
 
-def _close(screen, program, after):
+def _close(screen, program, after, words):
+    """Wait until all stages are there, press Q; return the number of the line that follows it."""
     program.wait_for("1/1 scene", after)
-    screen.do("windowfocus", screen.window("o3d-relief"))
+    window = screen.window("o3d-relief")
     program.wait_for("10/10 trim", after)
     screen.settled()
+    screen.do("windowfocus", "--sync", window)
     screen.do("key", "q")
+    return program.wait_for(words, after)
 
 
 def test_no_display(monkeypatch):
