@@ -128,7 +128,8 @@ def keep_parts(
         (np.ones(len(ends), dtype=np.int8), (ends[:, 0], ends[:, 1])), shape=(len(vertices), len(vertices))
     )
     _, part = connected_components(graph, directed=False)
-    corners = vertices[faces]
+    width = float(np.ptp(vertices, axis=0).max())
+    corners = vertices[faces] / (width if width > 0.0 else 1.0)  # squares of lengths shall not overflow
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     label, number = np.unique(part[faces[:, 0]], return_inverse=True)
     total = np.bincount(number, weights=area, minlength=len(label))

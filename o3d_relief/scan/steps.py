@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from o3d_relief.errors import MeshError
+from o3d_relief.errors import MeshError, ParameterError
 from o3d_relief.limits import check_points
 from o3d_relief.params import Triple, View
 from o3d_relief.progress import Tick, silent
@@ -63,6 +63,9 @@ _DECIDED = 0.8
 
 _LARGEST = 1e100
 """A wider cloud has numbers that are no coordinates; their squares would overflow."""
+
+_FINEST = 1e-12
+"""Least spacing, as a share of the cloud's size: points that are closer have no spacing to speak of."""
 
 _WIDEST = 4.0
 """The spacing around a single point counts up to so many times the median."""
@@ -223,7 +226,10 @@ def orientation_step(
     points, axes = work.points[used], normals.normals[used]
     spacing = float(np.median(work.local_spacing))
     if params.sensor is not None:
-        sensor = (np.array(params.sensor) - work.centre) / work.size
+        way = np.array(params.sensor) - work.centre
+        if not np.abs(way).max() < _LARGEST * work.size:
+            raise ParameterError(f"sensor is too far from the points. Got {params.sensor} instead.")
+        sensor = way / work.size
         method, turned = "sensor", towards(points, axes, sensor)
     else:
         votes = away_votes(points, axes, spacing, front=_unit(view.front), up=_unit(view.up), tick=tick)
@@ -274,6 +280,7 @@ def skin_step(work: Work, oriented: OrientationStage, surface: SurfaceStage, par
     # Along the border of a scan circles are half empty; the neighbours further in know better.
     around = np.percentile(work.local_spacing[work.neighbours.index[used]], 25.0, axis=1)
     local = np.minimum(around, _WIDEST * float(np.median(work.local_spacing[used])))
+    local = np.maximum(local, _FINEST)
     vertices = (surface.vertices - work.centre) / work.size
     distance, nearest = cKDTree(work.points[used]).query(vertices, workers=-1)
     distance = distance / local[nearest]

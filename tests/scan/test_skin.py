@@ -54,6 +54,13 @@ def test_parts_are_kept_by_their_area():
         assert kept.sum() == [32, 64, 192][parts - 1]
 
 
+@pytest.mark.parametrize("factor", [1e-200, 1e90])
+def test_parts_of_any_size_have_areas(factor):
+    vertices, faces = joined(grid(5), moved(grid(5, size=1.0), (200, 0, 0)))
+    kept, dropped = keep_parts(factor * vertices, faces, 0.5)
+    assert (kept.sum(), dropped) == (32, 1)
+
+
 def test_one_of_two_equal_parts_is_the_largest():
     vertices, faces = joined(grid(5), moved(grid(5), (200, 0, 0)))
     assert keep_parts(vertices, faces, 1.0)[0].sum() == 32

@@ -321,6 +321,10 @@ class TestRefusals:
         with pytest.raises(rel.MeshError, match=reason):
             rel.mesh_from_points(cloud)
 
+    def test_a_sensor_out_of_this_world(self, points):
+        with pytest.raises(rel.ParameterError, match=r"sensor is too far from the points\. Got \(1e\+300"):
+            rel.mesh_from_points(to_cloud(points[0]), rel.ScanParams(sensor=(1e300, 0, 0)))
+
     @pytest.mark.parametrize("seed", range(4))
     @pytest.mark.parametrize("count", [50, 90, 200])
     def test_points_without_any_order_end_in_a_mesh_or_an_error(self, seed, count):
