@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import os
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
 
 import numpy as np
-import open3d as o3d
 from numpy.typing import NDArray
 
 from o3d_relief.errors import MeshError, ParameterError
+from o3d_relief.progress import Tick, silent
+from o3d_relief.scan.poisson_open3d import Surface, reconstruct
+from o3d_relief.scan.poisson_process import reconstruct_apart
 
 __all__ = ["depth_for", "poisson_surface"]
 
@@ -21,6 +19,9 @@ _LEAST_POINTS = 50
 
 _MARGIN = 1.1
 """Width of the octree in extents of the cloud."""
+
+_MANY, _FINE = 20_000, 8
+"""More points, or a deeper octree, take longer than it takes to start another process."""
 
 _DEEPEST = 11
 """The depth that is chosen without being asked: extents of 2,000 spacings."""
@@ -48,11 +49,17 @@ def depth_for(extent: float, spacing: float) -> int:
 
 
 def poisson_surface(
-    points: NDArray[np.float64], normals: NDArray[np.float64], *, depth: int, threads: int
-) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    *,
+    depth: int,
+    threads: int,
+    tick: Tick = silent,
+) -> Surface:
     """Reconstruct a closed surface from oriented points.
 
-    Kazhdan and Hoppe, "Screened Poisson Surface Reconstruction" (2013), in Open3D.
+    Kazhdan and Hoppe, "Screened Poisson Surface Reconstruction" (2013), in Open3D. Where that takes longer
+    than a second or two it runs in a process of its own: Open3D cannot be interrupted.
 
     Parameters
     ----------
@@ -63,6 +70,8 @@ def poisson_surface(
     depth : int
         Of the octree.
     threads : int
+    tick : callable
+        Called now and then while the process runs; may call the work off.
 
     Returns
     -------
@@ -74,7 +83,7 @@ def poisson_surface(
     Raises
     ------
     MeshError
-        Too few points, points on a line, or no surface.
+        Too few points, points on a line, no surface, or the process broke.
     ParameterError
         More threads than the machine has.
     """
@@ -90,32 +99,12 @@ def poisson_surface(
     inside = (points - centre) / size
     if np.linalg.svd(np.linalg.qr(inside - inside.mean(axis=0), mode="r"), compute_uv=False)[1] < 1e-6:
         raise MeshError("The points lie on one line: they have no surface.")
-    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(inside))
-    cloud.normals = o3d.utility.Vector3dVector(normals)
-    with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error), _unheard():
-        mesh, density = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(
-            cloud, depth=depth, scale=_MARGIN, n_threads=threads
-        )
-    if len(mesh.triangles) == 0:
+    apart = len(points) > _MANY or depth > _FINE
+    vertices, faces, density = (
+        reconstruct_apart(inside, normals, depth, threads, _MARGIN, tick)
+        if apart
+        else reconstruct(inside, normals, depth, threads, _MARGIN)
+    )
+    if len(faces) == 0:
         raise MeshError("No surface could be laid through the points.")
-    vertices = np.asarray(mesh.vertices) * size + centre
-    return vertices, np.array(mesh.triangles, dtype=np.int64), np.array(density, dtype=np.float64)
-
-
-@contextmanager
-def _unheard() -> Iterator[None]:
-    """Keep what the library below Open3D writes past Python, its own lines, off the error stream."""
-    if sys.stderr is not None:
-        sys.stderr.flush()
-    try:
-        kept = os.dup(2)
-    except OSError:  # a process without an error stream
-        yield
-        return
-    try:
-        with Path(os.devnull).open("w") as sink:
-            os.dup2(sink.fileno(), 2)
-        yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)
+    return vertices * size + centre, faces, density

@@ -254,7 +254,9 @@ def _own_sign(points: NDArray[np.float64], axes: NDArray[np.float64], votes: NDA
     return -1.0 if outwards <= 1.0 - _DECIDED else 0.0
 
 
-def surface_step(work: Work, oriented: OrientationStage, params: ScanParams) -> SurfaceStage:
+def surface_step(
+    work: Work, oriented: OrientationStage, params: ScanParams, *, tick: Tick = silent
+) -> SurfaceStage:
     """Lay a closed surface through the points."""
     used = oriented.normals.any(axis=1)
     points = work.points[used]
@@ -263,7 +265,7 @@ def surface_step(work: Work, oriented: OrientationStage, params: ScanParams) -> 
     if depth is None:
         depth = depth_for(float(np.ptp(points, axis=0).max()), spacing)
     vertices, faces, density = poisson_surface(
-        points, oriented.normals[used], depth=depth, threads=params.threads
+        points, oriented.normals[used], depth=depth, threads=params.threads, tick=tick
     )
     return SurfaceStage(
         vertices=work.back(vertices),

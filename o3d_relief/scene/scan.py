@@ -120,7 +120,7 @@ def scan_points(
     journal.begin("orientation")
     oriented = journal.keep(orientation_step(work, normals, ground, params, view, tick=journal.tick))
     journal.begin("surface")
-    surface = journal.keep(surface_step(work, oriented, params))
+    surface = journal.keep(surface_step(work, oriented, params, tick=journal.tick))
     journal.begin("skin")
     skin = journal.keep(skin_step(work, oriented, surface, params))
     journal.begin("parts")
