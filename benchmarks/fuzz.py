@@ -27,6 +27,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--first", type=int, default=0, metavar="N", help="go on after N cases; whole hundreds")
     parser.add_argument("--failures", type=Path, metavar="DIR", help="keep the cases that fail here")
     parser.add_argument("--replay", type=Path, metavar="FILE", help="run one of them again")
     options = parser.parse_args()
@@ -50,7 +51,7 @@ def main() -> int:
                 (options.failures / f"{len(failures)}.pickle").write_bytes(pickle.dumps(case))
 
     # Short runs of hypothesis: it tries variations of what it tried before, and should not for long.
-    for first in range(0, options.count, _RUN):
+    for first in range(options.first, options.count, _RUN):
         campaign = given(st.one_of(file_cases(), file_cases(), mesh_cases(), cloud_cases()))(judge)
         campaign = settings(
             max_examples=min(_RUN, options.count - first),

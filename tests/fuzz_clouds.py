@@ -151,6 +151,8 @@ def damaged_cloud(name: str, kind: str | None, chosen: list[tuple[str, int]]) ->
     points, normals = _sampled(SHAPES[name])
     extra = {} if kind is None else {"normals": _NORMALS[kind](normals, np.random.default_rng(3))}
     for change, amount in chosen:
+        if len(points) == 0:  # holes have taken all
+            break
         rng = np.random.default_rng(amount)
         points = (MOVES | CHANGES)[change](points, SIZES[amount % len(SIZES)], rng)
     return {"points": points} | {key: values for key, values in extra.items() if len(values) == len(points)}
