@@ -27,7 +27,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--first", type=int, default=0, metavar="N", help="go on after N cases; whole hundreds")
+    parser.add_argument("--first", type=int, default=0, metavar="N", help="go on after N cases")
     parser.add_argument("--failures", type=Path, metavar="DIR", help="keep the cases that fail here")
     parser.add_argument("--replay", type=Path, metavar="FILE", help="run one of them again")
     options = parser.parse_args()
