@@ -5,13 +5,17 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from o3d_relief.bounds.aligned import aligned_pairs, footprints
 from o3d_relief.bounds.crossings import edges_of
 from o3d_relief.bounds.pairs import Pairs
 
 __all__ = ["silhouette_pairs", "silhouettes"]
 
 _FEWEST_CELLS, _MOST_CELLS = 128, 4096
-"""Raster, along the longer side, in whose cells edges that may cross are looked up: one for each edge."""
+"""Raster, along the longer side, in whose cells edges that may cross are looked up: four for each edge."""
+
+_PIECE = 0.9
+"""Length of the pieces of edges, in cells, at most: with a margin they meet four cells."""
 
 _CLEAR = 1e-3
 """Edges cross in the picture where each reaches this far beyond the other, in relief units."""
@@ -56,7 +60,7 @@ def silhouette_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64]) ->
     Where surfaces have changed places, they did so in a part of the picture that ends where they cross each
     other, or at a silhouette of one of them. So a vertex lies in it, or an edge pierces a triangle at its
     border, or two silhouettes cross at its corner; or the surface has folded over at a silhouette, and the
-    edges of neighbours cross there.
+    edges of neighbours cross there. Silhouettes on top of each other have pairs at their ends.
 
     Parameters
     ----------
@@ -80,6 +84,7 @@ def silhouette_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64]) ->
     edges = edges_of(faces)
     turning = np.isin(edges @ [len(vertices), 1], silhouettes(vertices, faces) @ [len(vertices), 1])
     far, near = _in_one_cell(vertices, edges, np.flatnonzero(turning)), _in_one_star(faces, edges, turning)
+    far, near = _overlapping(vertices[:, :2], edges, far), _overlapping(vertices[:, :2], edges, near)
     one, other = np.concatenate([far, near], axis=1)
     one, other, share, other_share = _meeting(vertices[:, :2], edges, one, other)
     ends, other_ends = vertices[edges[one], 2], vertices[edges[other], 2]
@@ -95,7 +100,10 @@ def silhouette_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64]) ->
         lower_weights=_weights(lower_share),
         gap=np.abs(height - other_height),
     )
-    return pairs.select(pairs.gap > _APART)
+    prints = footprints(vertices, faces, edges, np.flatnonzero(turning))
+    stacked = _overlapping(vertices[:, :2], edges, _in_one_cell(vertices, edges, prints.first))
+    aligned = aligned_pairs(vertices, edges, prints, stacked)
+    return Pairs.join([pairs.select(pairs.gap > _APART), aligned])
 
 
 def _in_one_cell(
@@ -104,16 +112,17 @@ def _in_one_cell(
     """Find chosen edges that pass through one cell of a raster: their numbers, (2, q), some twice."""
     low = vertices[:, :2].min(axis=0)
     extent = float(np.ptp(vertices[:, :2], axis=0).max())
-    cells = int(np.clip(np.sqrt(len(chosen)), _FEWEST_CELLS, _MOST_CELLS))
+    cells = int(np.clip(2.0 * np.sqrt(len(chosen)), _FEWEST_CELLS, _MOST_CELLS))
     begin, end = (vertices[edges[chosen], :2] - low).transpose(1, 0, 2) * (cells / max(extent, 1e-30))
     # Edges in pieces that are no longer than a cell: each meets four cells at most.
-    pieces = np.maximum(np.ceil(np.abs(end - begin).max(axis=1)).astype(np.int64), 1)
+    pieces = np.maximum(np.ceil(np.abs(end - begin).max(axis=1) / _PIECE).astype(np.int64), 1)
     edge = np.repeat(np.arange(len(chosen)), pieces)
     number = np.arange(len(edge)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
     step = ((end - begin) / pieces[:, None])[edge]
     first = begin[edge] + step * number[:, None]
-    least = np.floor(np.minimum(first, first + step) - 1e-9).astype(np.int64)
-    most = np.floor(np.maximum(first, first + step) + 1e-9).astype(np.int64)
+    margin = min(_CLEAR * cells / max(extent, 1e-30), (1.0 - _PIECE) / 2.0)
+    least = np.floor(np.minimum(first, first + step) - margin).astype(np.int64)
+    most = np.floor(np.maximum(first, first + step) + margin).astype(np.int64)
     keys = []
     for corner in np.array([[0, 0], [0, 1], [1, 0], [1, 1]]):
         cell = least + corner
@@ -147,6 +156,18 @@ def _within(keys: NDArray[np.int64], n: int) -> NDArray[np.int64]:
     one = np.repeat(np.arange(len(group)), later)
     other = one + 1 + np.arange(len(one)) - np.repeat(np.cumsum(later) - later, later)
     return np.stack([member[one], member[other]])
+
+
+def _overlapping(
+    plane: NDArray[np.float64], edges: NDArray[np.int64], both: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Choose the edges whose boxes in the picture overlap or touch: their numbers, (2, q)."""
+    begin, end = plane[edges].transpose(1, 0, 2)
+    box = np.concatenate([np.minimum(begin, end), -np.maximum(begin, end)], axis=1)
+    beyond = box[both[0]]
+    beyond += box[:, [2, 3, 0, 1]][both[1]]
+    near = beyond <= _CLEAR
+    return both[:, near[:, 0] & near[:, 1] & near[:, 2] & near[:, 3]]
 
 
 def _meeting(
