@@ -23,12 +23,13 @@ _EXACT = 1e-4
 
 _SLACK = 0.01
 _FORGETFUL = 7
-"""In so many rounds, pairs that have more than this many relief units to spare are no longer held. Later on
-every pair that was ever wrong stays held, so that the rounds come to an end."""
+"""In so many rounds, pairs that have more than this many relief units to spare are no longer held, but for
+those that were wrong again after that. Later on every pair that was ever wrong stays held, so that the rounds
+come to an end."""
 
 _ROUNDS = 40
 
-_FEW = 500
+_FEW = 3000
 """Pairs out of order on lines up to which edges that pierce triangles are looked for at the same time."""
 
 _CELLS = 256
@@ -143,6 +144,7 @@ def keep_order(
         # What crosses is mostly out of order on a line as well: while there is much of it, lines will do.
         if left <= _FEW or rounds == _ROUNDS:
             found, count = between.look_at(current)
+            found = found.select(np.subtract(*found.heights(current)) < _wanted_gaps(found, min_gap))
             left += count
             if left < fewest:
                 best, fewest = current, left
@@ -193,6 +195,7 @@ class _Lines:
     def __init__(self, pairs: Pairs, n: int, min_gap: float) -> None:
         self._pairs, self._min_gap = pairs, min_gap
         self._held = np.zeros(len(pairs), dtype=bool)
+        self._ever, self._again = self._held.copy(), self._held.copy()
         self._last = np.full(n, np.nan)
         self.wrong = np.zeros(len(pairs), dtype=bool)
 
@@ -210,6 +213,7 @@ class _Lines:
     def let_go(self, z: NDArray[np.float64]) -> None:
         """Hold no longer what has room to spare."""
         self._held[self._held] = ~_spare(self.held, z, self._min_gap)
+        self._held |= self._again
 
     def take_worst(self, z: NDArray[np.float64]) -> Pairs:
         """Hold the worst of the wrong pairs, too; return those that were not held before."""
@@ -217,7 +221,9 @@ class _Lines:
         wrong = self._pairs.select(self.wrong)
         lacking[self.wrong] = required_gaps(wrong, self._min_gap) - np.subtract(*wrong.heights(z))
         new = worst_of_stacks(self._pairs, lacking, self.wrong) & ~self._held
+        self._again |= new & self._ever
         self._held |= new
+        self._ever |= new
         return self._pairs.select(new)
 
 

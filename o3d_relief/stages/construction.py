@@ -20,6 +20,10 @@ _EXACT = 1e-6
 """Energy norm of the error, in relief units, to which the displacement is solved: heights are then exact to
 1e-8 of the extent."""
 
+_SMALL_PART = 20000
+_FEW_UNKNOWNS = 200000
+"""Scenes of no part with more vertices, and of no more unknowns, are factorised: their factors are sparse."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Construction:
@@ -126,13 +130,16 @@ def _solve_free(
     free = np.flatnonzero(free_mask)
     rows = laplacian[free]
     right_hand_side = np.zeros(len(free))
+    direct = {}
     if springs is not None:
+        if np.bincount(connected_components(laplacian, directed=False)[1]).max() <= _SMALL_PART:
+            direct = {"direct_up_to": _FEW_UNKNOWNS}
         form, pull = springs
         rows = (rows + form[free]).tocsr()
         right_hand_side = pull[free]
     displacement[free] = 0.0
     right_hand_side = right_hand_side - rows @ displacement
-    displacement[free] = solve_spd(rows[:, free].tocsr(), right_hand_side, error=_EXACT, tick=tick)
+    displacement[free] = solve_spd(rows[:, free].tocsr(), right_hand_side, error=_EXACT, tick=tick, **direct)
 
 
 def _move_loose(
