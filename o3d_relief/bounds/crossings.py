@@ -270,6 +270,6 @@ def _beside(beside: sp.csr_array, corners: NDArray[np.int64]) -> tuple[NDArray[n
 
 
 def _once(keys: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return keys in rising order, each once; np.unique takes thirty times as long on some versions of NumPy."""
+    """Return keys in rising order, each once; np.unique takes far longer on some versions of NumPy."""
     keys = np.sort(keys)
     return keys[np.diff(keys, prepend=-1) > 0]

@@ -14,9 +14,11 @@ from o3d_relief.errors import SolverError
 from o3d_relief.linalg.multigrid import Multigrid, multigrid
 from o3d_relief.progress import Tick, silent
 
-__all__ = ["multigrid", "solve_direct", "solve_spd"]
+__all__ = ["FACTORISED_UP_TO", "multigrid", "solve_direct", "solve_spd"]
 
-_DIRECT_UP_TO = 4000
+FACTORISED_UP_TO = 4000
+"""Unknowns up to which any system is factorised."""
+
 _MAX_ITERATIONS = 1000
 
 _LOOK_BACK = 6
@@ -31,7 +33,7 @@ def solve_spd(
     right_hand_side: NDArray[np.float64],
     *,
     similar: sp.csr_array | None = None,
-    direct_up_to: int = _DIRECT_UP_TO,
+    direct_up_to: int = FACTORISED_UP_TO,
     tolerance: float = 1e-12,
     error: float = 0.0,
     start: NDArray[np.float64] | None = None,

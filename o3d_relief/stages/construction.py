@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from o3d_relief.linalg.solve import solve_spd
+from o3d_relief.linalg.solve import FACTORISED_UP_TO, solve_spd
 from o3d_relief.progress import Tick, silent
 
 __all__ = ["Construction", "construct", "leaders"]
@@ -130,16 +130,18 @@ def _solve_free(
     free = np.flatnonzero(free_mask)
     rows = laplacian[free]
     right_hand_side = np.zeros(len(free))
-    direct = {}
+    direct_up_to = FACTORISED_UP_TO
     if springs is not None:
         if np.bincount(connected_components(laplacian, directed=False)[1]).max() <= _SMALL_PART:
-            direct = {"direct_up_to": _FEW_UNKNOWNS}
+            direct_up_to = _FEW_UNKNOWNS
         form, pull = springs
         rows = (rows + form[free]).tocsr()
         right_hand_side = pull[free]
     displacement[free] = 0.0
     right_hand_side = right_hand_side - rows @ displacement
-    displacement[free] = solve_spd(rows[:, free].tocsr(), right_hand_side, error=_EXACT, tick=tick, **direct)
+    displacement[free] = solve_spd(
+        rows[:, free].tocsr(), right_hand_side, direct_up_to=direct_up_to, error=_EXACT, tick=tick
+    )
 
 
 def _move_loose(
