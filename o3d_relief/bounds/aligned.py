@@ -43,6 +43,26 @@ class Footprints:
     left: NDArray[np.bool_]
     right: NDArray[np.bool_]
 
+    def members(self, chosen: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return all edges of chosen footprints, and the place of each one's footprint among the chosen."""
+        count = self.begin[chosen + 1] - self.begin[chosen]
+        of = np.repeat(np.arange(len(chosen)), count)
+        within = np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count)
+        return self.edge[self.begin[chosen][of] + within], of
+
+    def numbers(self) -> NDArray[np.int64]:
+        """Return the number of the footprint of each edge, -1 for those that have none."""
+        number = np.full(int(self.edge.max(initial=-1)) + 1, -1)
+        number[self.edge] = np.repeat(np.arange(len(self.first)), np.diff(self.begin))
+        return number
+
+    def combined(self, one: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Combine all edges over the footprints of some with all over those of others, (2, q)."""
+        number = self.numbers()
+        edge, of = self.members(number[one])
+        second, of_edge = self.members(number[other[of]])
+        return np.stack([edge[of_edge], second])
+
 
 def footprints(
     vertices: NDArray[np.float64],
@@ -107,14 +127,13 @@ def aligned_pairs(
         Of surfaces that cover a part of the picture together, not of those that only end where the other
         begins.
     """
-    number = np.zeros(len(edges), dtype=np.int64)
-    number[prints.first] = np.arange(len(prints.first))
+    number = prints.numbers()
     itself = np.tile(prints.first, (2, 1))
     a, b = np.concatenate([both, both[::-1], itself], axis=1)
     a, b, place = _on_each_other(vertices[:, :2], edges, a, b)
     covered = _cover(vertices[:, :2], edges, prints, number, a, b, place)
     # Every end above the place, on every edge over the footprint.
-    tips, tip_of = _members(prints, number[a[covered]])
+    tips, tip_of = prints.members(number[a[covered]])
     ends = edges[tips]
     same = vertices[edges[a, place], :2][covered][tip_of]
     at = np.abs(vertices[ends, :2] - same[:, None]).max(axis=2).argmin(axis=1)
@@ -122,14 +141,6 @@ def aligned_pairs(
     once = np.unique(tip * len(prints.first) + over)
     tip, over = np.divmod(once, max(len(prints.first), 1))
     return _next_on(vertices, edges, prints, tip, over)
-
-
-def _members(prints: Footprints, chosen: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return all edges of chosen footprints, and the place of each one's footprint among the chosen."""
-    count = prints.begin[chosen + 1] - prints.begin[chosen]
-    of = np.repeat(np.arange(len(chosen)), count)
-    within = np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count)
-    return prints.edge[prints.begin[chosen][of] + within], of
 
 
 def _on_each_other(
@@ -209,7 +220,7 @@ def _next_on(
     over: NDArray[np.int64],
 ) -> Pairs:
     """Pair vertices with the next edge above and below them among those of a footprint."""
-    edge, of = _members(prints, over)
+    edge, of = prints.members(over)
     share, _, _ = _projected(vertices[:, :2], edges[edge], tip[of])
     share = share.clip(0.0, 1.0)
     height = vertices[edges[edge, 0], 2] * (1.0 - share) + vertices[edges[edge, 1], 2] * share

@@ -83,8 +83,11 @@ def silhouette_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64]) ->
     """
     edges = edges_of(faces)
     turning = np.isin(edges @ [len(vertices), 1], silhouettes(vertices, faces) @ [len(vertices), 1])
-    far, near = _in_one_cell(vertices, edges, np.flatnonzero(turning)), _in_one_star(faces, edges, turning)
-    far, near = _overlapping(vertices[:, :2], edges, far), _overlapping(vertices[:, :2], edges, near)
+    # Of edges on top of each other, one tells where all of them cross others.
+    prints = footprints(vertices, faces, edges, np.flatnonzero(turning))
+    stacked = _overlapping(vertices[:, :2], edges, _in_one_cell(vertices, edges, prints.first))
+    far = prints.combined(*_meeting(vertices[:, :2], edges, *stacked)[:2])
+    near = _overlapping(vertices[:, :2], edges, _in_one_star(faces, edges, turning))
     one, other = np.concatenate([far, near], axis=1)
     one, other, share, other_share = _meeting(vertices[:, :2], edges, one, other)
     ends, other_ends = vertices[edges[one], 2], vertices[edges[other], 2]
@@ -100,8 +103,6 @@ def silhouette_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64]) ->
         lower_weights=_weights(lower_share),
         gap=np.abs(height - other_height),
     )
-    prints = footprints(vertices, faces, edges, np.flatnonzero(turning))
-    stacked = _overlapping(vertices[:, :2], edges, _in_one_cell(vertices, edges, prints.first))
     aligned = aligned_pairs(vertices, edges, prints, stacked)
     return Pairs.join([pairs.select(pairs.gap > _APART), aligned])
 
