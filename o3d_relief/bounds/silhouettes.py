@@ -23,6 +23,9 @@ _CLEAR = 1e-3
 _APART = 5e-4
 """Smallest gap in relief units: edges that touch are in no order."""
 
+_BLOCK = 16384
+"""Edges that are worked on at once."""
+
 _CORNERS = np.array([[1, 2, 0], [2, 0, 1], [0, 1, 2]])
 """Of each edge of a triangle: both ends, and the corner opposite."""
 
@@ -165,10 +168,15 @@ def _overlapping(
     """Choose the edges whose boxes in the picture overlap or touch: their numbers, (2, q)."""
     begin, end = plane[edges].transpose(1, 0, 2)
     box = np.concatenate([np.minimum(begin, end), -np.maximum(begin, end)], axis=1)
-    beyond = box[both[0]]
-    beyond += box[:, [2, 3, 0, 1]][both[1]]
-    near = beyond <= _CLEAR
-    return both[:, near[:, 0] & near[:, 1] & near[:, 2] & near[:, 3]]
+    turned = np.ascontiguousarray(box[:, [2, 3, 0, 1]])
+    near = np.zeros(both.shape[1], dtype=bool)
+    for block in range(0, both.shape[1], _BLOCK):
+        one, other = both[:, block : block + _BLOCK]
+        beyond = box[one]
+        beyond += turned[other]
+        x, y, back_x, back_y = (beyond <= _CLEAR).T
+        near[block : block + _BLOCK] = x & y & back_x & back_y
+    return both[:, near]
 
 
 def _meeting(
