@@ -156,12 +156,8 @@ def edges_of(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     start = np.ascontiguousarray(faces.T)
     end = start[[1, 2, 0]]
     n = int(faces.max(initial=0)) + 1
-    ordered = np.sort(
-        (np.minimum(start, end) * n + np.maximum(start, end)).ravel()
-    )  # np.unique takes thirty times as long on some versions of NumPy
-    is_new = np.ones(len(ordered), dtype=bool)
-    is_new[1:] = ordered[1:] != ordered[:-1]
-    return np.stack(np.divmod(ordered[is_new], n), axis=1)
+    keys = (np.minimum(start, end) * n + np.maximum(start, end)).ravel()
+    return np.stack(np.divmod(_once(keys), n), axis=1)
 
 
 def crossings(vertices: NDArray[np.float64], faces: NDArray[np.int64], edges: NDArray[np.int64]) -> Crossings:
@@ -245,16 +241,35 @@ def around(found: Crossings, vertices: NDArray[np.float64], faces: NDArray[np.in
         Among the edges of all triangles that share a vertex with one of the two, and the triangles that
         share a vertex with the other.
     """
-    entries = np.ones(faces.size, dtype=bool), (faces.ravel(), np.repeat(np.arange(len(faces)), 3))
-    beside = sp.csr_array(entries, shape=(len(vertices), len(faces)))
-    edges, others = [np.zeros((0, 2), dtype=np.int64)], [np.zeros((0, 3), dtype=np.int64)]
-    for edge, face in zip(found.edge, found.face, strict=True):
-        at_edge, at_face = (faces[np.unique(beside[corners].indices)] for corners in (edge, face))
-        for one, other in ((at_edge, at_face), (at_face, at_edge)):
-            own = edges_of(one)
-            edges.append(np.repeat(own, len(other), axis=0))
-            others.append(np.tile(other, (len(own), 1)))
-    edge, face = np.concatenate(edges), np.concatenate(others)
-    apart = (edge[:, :, None] != face[:, None, :]).all(axis=(1, 2))
-    both = np.unique(np.concatenate([edge[apart], face[apart]], axis=1), axis=0)
-    return _stretches(vertices[:, :2], both[:, :2], both[:, 2:])
+    n, m = len(vertices), len(faces)
+    entries = np.ones(faces.size, dtype=bool), (faces.ravel(), np.repeat(np.arange(m), 3))
+    beside = sp.csr_array(entries, shape=(n, m))
+    query, at_edge = _beside(beside, found.edge)
+    other_query, at_face = _beside(beside, found.face)
+    count = np.bincount(other_query, minlength=len(found))
+    times, begin = count[query], (np.cumsum(count) - count)[query]
+    first = np.repeat(np.arange(len(query)), times)
+    second = begin[first] + np.arange(len(first)) - (np.cumsum(times) - times)[first]
+    one, other = np.divmod(_once(at_edge[first] * m + at_face[second]), m)
+    one, other = np.concatenate([one, other]), np.concatenate([other, one])
+    low, high = (extreme(vertices[:, :2][faces], axis=1) for extreme in (np.min, np.max))
+    overlap = ((low[one] <= high[other]) & (low[other] <= high[one])).all(axis=1)
+    one, other = one[overlap], other[overlap]
+    ends = np.sort(faces[one][:, [[0, 1], [1, 2], [2, 0]]], axis=2)
+    keys = (ends[:, :, 0] * n + ends[:, :, 1]) * m + other[:, None]
+    apart = (ends[:, :, :, None] != faces[other][:, None, None, :]).all(axis=(2, 3))
+    edge, face = np.divmod(_once(keys[apart]), m)
+    return _stretches(vertices[:, :2], np.stack(np.divmod(edge, n), axis=1), faces[face])
+
+
+def _beside(beside: sp.csr_array, corners: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the faces with one of some corners (q, c), each once: number of the row, rising, and face."""
+    rows = beside[corners.ravel()]
+    query = np.repeat(np.repeat(np.arange(len(corners)), corners.shape[1]), np.diff(rows.indptr))
+    return np.divmod(_once(query * beside.shape[1] + rows.indices), beside.shape[1])
+
+
+def _once(keys: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return keys in rising order, each once; np.unique takes far longer on some versions of NumPy."""
+    keys = np.sort(keys)
+    return keys[np.diff(keys, prepend=-1) > 0]

@@ -75,7 +75,10 @@ def inversions(
     upper, lower = pairs.heights(before)
     gap = upper - lower
     turned = np.flatnonzero(gap < -_SAME)
-    crossed = origin.crossed(pairs.upper[turned], pairs.lower[turned])
+    there = pairs.select(turned)
+    crossed = origin.crossed(
+        _met(vertices, there.upper, there.upper_weights), _met(vertices, there.lower, there.lower_weights)
+    )
     inverted = turned[~crossed]
     wide = gap >= max(min_gap, _SAME)
     missed = np.flatnonzero(wide & (pairs.gap < min_gap - _SAME) & (min_gap > 0.0))
@@ -94,3 +97,21 @@ def inversions(
         gaps_missed=len(missed),
         places=places,
     )
+
+
+def _met(
+    vertices: NDArray[np.float64], corners: NDArray[np.int64], weights: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """Write points of triangles as what a line through them meets: a triangle, an edge or a vertex, (q, 3).
+
+    A line through an edge meets both its triangles, whichever of them the rays report.
+    """
+    plane = vertices[corners, :2]
+    one, other = plane - np.roll(plane, -1, axis=1), plane - np.roll(plane, -2, axis=1)
+    across = np.roll(one, -1, axis=1)  # the side opposite to each corner
+    area = np.abs(one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0])
+    height = area / np.maximum(np.sqrt(across[..., 0] ** 2 + across[..., 1] ** 2), 1e-30)
+    off = weights * height < _SAME
+    off[off.all(axis=1)] = False
+    furthest = np.take_along_axis(corners, weights.argmax(axis=1)[:, None], axis=1)
+    return np.where(off, furthest, corners)

@@ -23,12 +23,13 @@ _EXACT = 1e-4
 
 _SLACK = 0.01
 _FORGETFUL = 7
-"""In so many rounds, pairs that have more than this many relief units to spare are no longer held. Later on
-every pair that was ever wrong stays held, so that the rounds come to an end."""
+"""In so many rounds, pairs that have more than this many relief units to spare are no longer held, but for
+those that were wrong again after that. Later on every pair that was ever wrong stays held, so that the rounds
+come to an end."""
 
 _ROUNDS = 40
 
-_FEW = 500
+_FEW = 3000
 """Pairs out of order on lines up to which edges that pierce triangles are looked for at the same time."""
 
 _CELLS = 256
@@ -143,6 +144,7 @@ def keep_order(
         # What crosses is mostly out of order on a line as well: while there is much of it, lines will do.
         if left <= _FEW or rounds == _ROUNDS:
             found, count = between.look_at(current)
+            found = found.select(np.subtract(*found.heights(current)) < required_gaps(found, min_gap))
             left += count
             if left < fewest:
                 best, fewest = current, left
@@ -172,19 +174,28 @@ class _BetweenLines:
 
     def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
         self._vertices, self._faces = vertices, faces
-        self._edges = edges_of(faces)
+        self._edges, self._raster = edges_of(faces), _Raster(vertices, faces)
         self._last = np.full(len(vertices), np.nan)
 
     def look_at(self, z: NDArray[np.float64]) -> tuple[Pairs, int]:
         """Return pairs that keep apart what was found, and how much it was, where something has moved."""
-        near = self._faces[_over_or_under(self._vertices, self._faces, z != self._last)]
+        vertices, faces = self._vertices, self._faces
+        moved = z != self._last
         self._last = z
+        changed = moved[faces].any(axis=1)
+        near = np.ones(len(faces), dtype=bool) if changed.all() else self._raster.over_or_under(changed)
         at = np.zeros(len(z), dtype=bool)
-        at[near] = True
+        at[faces[near]] = True
         edges = self._edges[at[self._edges].all(axis=1)]
-        crossing, count = new_crossings(self._vertices, near, edges, z)
-        at_foot = foot_pairs(self._vertices, near, edges, z)
-        return Pairs.join([crossing, at_foot]), count + len(at_foot)
+        # Edges that moved may pierce what lies near; the others, triangles that moved.
+        own = moved[edges].any(axis=1)
+        looked = [new_crossings(vertices, faces[near], edges[own], z)]
+        if not own.all():
+            looked.append(new_crossings(vertices, faces[changed], edges[~own], z))
+        cut = (z[faces].min(axis=1) < 0.0) & (z[faces].max(axis=1) > 0.0)
+        at_foot = foot_pairs(vertices, faces[near & self._raster.over_or_under(cut & near)], edges, z)
+        found = Pairs.join([*(pairs for pairs, _ in looked), at_foot])
+        return found, sum(count for _, count in looked) + len(at_foot)
 
 
 class _Lines:
@@ -193,6 +204,7 @@ class _Lines:
     def __init__(self, pairs: Pairs, n: int, min_gap: float) -> None:
         self._pairs, self._min_gap = pairs, min_gap
         self._held = np.zeros(len(pairs), dtype=bool)
+        self._ever, self._again = self._held.copy(), self._held.copy()
         self._last = np.full(n, np.nan)
         self.wrong = np.zeros(len(pairs), dtype=bool)
 
@@ -210,6 +222,7 @@ class _Lines:
     def let_go(self, z: NDArray[np.float64]) -> None:
         """Hold no longer what has room to spare."""
         self._held[self._held] = ~_spare(self.held, z, self._min_gap)
+        self._held |= self._again
 
     def take_worst(self, z: NDArray[np.float64]) -> Pairs:
         """Hold the worst of the wrong pairs, too; return those that were not held before."""
@@ -217,33 +230,36 @@ class _Lines:
         wrong = self._pairs.select(self.wrong)
         lacking[self.wrong] = required_gaps(wrong, self._min_gap) - np.subtract(*wrong.heights(z))
         new = worst_of_stacks(self._pairs, lacking, self.wrong) & ~self._held
+        self._again |= new & self._ever
         self._held |= new
+        self._ever |= new
         return self._pairs.select(new)
 
 
-def _over_or_under(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], moved: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
-    """Find the triangles that may lie above or below one with a vertex that moved, (m,)."""
-    low, high = vertices[:, :2].min(axis=0), vertices[:, :2].max(axis=0)
-    cell = ((vertices[:, :2] - low) / (high - low + 1e-9) * _CELLS).astype(np.int64)
-    corners = cell[faces]
-    first, last = corners.min(axis=1), corners.max(axis=1) + 1
-    # Count, in each cell of a raster, the boxes of triangles that moved; then ask for the boxes of all.
-    steps = np.zeros((_CELLS + 1, _CELLS + 1), dtype=np.int64)
-    changed = moved[faces].any(axis=1)
-    for x, y, sign in ((first, first, 1), (last, last, 1), (first, last, -1), (last, first, -1)):
-        np.add.at(steps, (x[changed, 0], y[changed, 1]), sign)
-    marked = steps.cumsum(axis=0).cumsum(axis=1)[:-1, :-1] > 0
-    total = np.zeros((_CELLS + 1, _CELLS + 1), dtype=np.int64)
-    total[1:, 1:] = marked.cumsum(axis=0).cumsum(axis=1)
-    within = (
-        total[last[:, 0], last[:, 1]]
-        - total[first[:, 0], last[:, 1]]
-        - total[last[:, 0], first[:, 1]]
-        + total[first[:, 0], first[:, 1]]
-    )
-    return np.asarray(within > 0)
+class _Raster:
+    """Boxes of triangles, seen from the front, in cells."""
+
+    def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
+        low, high = vertices[:, :2].min(axis=0), vertices[:, :2].max(axis=0)
+        cell = np.ascontiguousarray(((vertices[:, :2] - low) / (high - low + 1e-9) * _CELLS).T).astype(
+            np.int64
+        )
+        a, b, c = (cell[:, corner] for corner in np.ascontiguousarray(faces.T))
+        self._first = np.minimum(np.minimum(a, b), c)
+        self._last = np.maximum(np.maximum(a, b), c) + 1
+
+    def over_or_under(self, changed: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Find the triangles (m,) that may lie above or below some of them, (m,)."""
+        (left, bottom), (right, top) = self._first, self._last
+        # Count, in each cell of a raster, the boxes of triangles that changed; then ask for the boxes of all.
+        steps = np.zeros((_CELLS + 1, _CELLS + 1), dtype=np.int64)
+        for x, y, sign in ((left, bottom, 1), (right, top, 1), (left, top, -1), (right, bottom, -1)):
+            np.add.at(steps, (x[changed], y[changed]), sign)
+        marked = steps.cumsum(axis=0).cumsum(axis=1)[:-1, :-1] > 0
+        total = np.zeros((_CELLS + 1, _CELLS + 1), dtype=np.int64)
+        total[1:, 1:] = marked.cumsum(axis=0).cumsum(axis=1)
+        within = total[right, top] - total[left, top] - total[right, bottom] + total[left, bottom]
+        return np.asarray(within > 0)
 
 
 def _wanted_gaps(pairs: Pairs, min_gap: float) -> NDArray[np.float64]:

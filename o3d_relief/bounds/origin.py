@@ -8,6 +8,9 @@ from numpy.typing import NDArray
 
 __all__ = ["Origin", "triangles_cross"]
 
+_ROUNDING = 1e-9
+"""Relief units up to which corners lie in a plane, and stretches are points."""
+
 
 class Origin:
     """The triangles of the scene that the triangles of a trimmed relief are parts of.
@@ -86,12 +89,15 @@ class Origin:
 
 
 def triangles_cross(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Tell which pairs of triangles cross each other, by an edge of the one that pierces the other.
+    """Tell which pairs of triangles cross each other, each passing through the other in a common segment.
+
+    Each has corners on both sides of the other's plane, and on the line in which these planes meet both cover
+    a common stretch. So edges may pass exactly through edges or corners (Möller 1997).
 
     Parameters
     ----------
     one, other : (q, 3, 3) float64
-        Corners.
+        Corners, in relief units.
 
     Returns
     -------
@@ -105,18 +111,40 @@ def triangles_cross(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDA
     >>> triangles_cross(flat, needle), triangles_cross(flat, needle + [0, 0, 1.0])
     (array([ True]), array([False]))
     """
-    result = np.zeros(len(one), dtype=bool)
-    for edges, face in ((one, other), (other, one)):
-        a, b, c = face[:, 0], face[:, 1], face[:, 2]
-        for i in range(3):
-            p, q = edges[:, i], edges[:, (i + 1) % 3]
-            apart = _volume(a, b, c, p) * _volume(a, b, c, q) < 0.0
-            sides = np.stack([_volume(p, q, a, b), _volume(p, q, b, c), _volume(p, q, c, a)])
-            result |= apart & ((sides > 0.0).all(axis=0) | (sides < 0.0).all(axis=0))
-    return result
+    normals = [_normals(corners) for corners in (one, other)]
+    line = np.cross(normals[0], normals[1])
+    length = np.linalg.norm(line, axis=1, keepdims=True)
+    line /= np.where(length > 0.0, length, 1.0)
+    middle = other[:, :1]
+    begin, end = np.full(len(one), -np.inf), np.full(len(one), np.inf)
+    apart = np.ones(len(one), dtype=bool)
+    for corners, normal, base in ((one, normals[1], other[:, :1]), (other, normals[0], one[:, :1])):
+        height = np.einsum("qck,qk->qc", corners - base, normal)
+        height[np.abs(height) <= _ROUNDING] = 0.0
+        apart &= (height.min(axis=1) < 0.0) & (height.max(axis=1) > 0.0)
+        first, last = _covered(height, np.einsum("qck,qk->qc", corners - middle, line))
+        begin, end = np.maximum(begin, first), np.minimum(end, last)
+    return np.asarray(apart & (end - begin > _ROUNDING))
 
 
-def _volume(
-    a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64], d: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    return np.asarray((np.cross(b - a, c - a) * (d - a)).sum(axis=1))
+def _normals(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the unit normals of triangles, 0 for those without an area."""
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    size = np.linalg.norm(normal, axis=1, keepdims=True)
+    return np.asarray(normal / np.where(size > 0.0, size, 1.0))
+
+
+def _covered(
+    height: NDArray[np.float64], along: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return where triangles begin and end on a line in a plane, (q,) each.
+
+    `height` and `along`, (q, 3) each, are where their corners lie above that plane and along that line.
+    """
+    following, next_along = np.roll(height, -1, axis=1), np.roll(along, -1, axis=1)
+    passes = height * following <= 0.0
+    fall = height - following
+    share = height / np.where(fall == 0.0, 1.0, fall)  # an edge in the plane ends at corners of the others
+    place = along + share * (next_along - along)
+    first = np.where(passes, place, np.inf).min(axis=1)
+    return first, np.where(passes, place, -np.inf).max(axis=1)

@@ -26,6 +26,9 @@ _UPRIGHT = 0.01
 """Share of its area at which a triangle, seen from the front, counts as upright: there an error of float32 in
 x and y is one of more than 1e-3 relief units in z."""
 
+_NARROW = 0.01
+"""Change of weights up to which points are moved onto their lines."""
+
 _BLOCK = 16384
 """Triangles that are worked on at once."""
 
@@ -298,10 +301,30 @@ def grid_pairs(
     # One sort by line and height on it: t is well below the factor's size, and float64 has room for both.
     order = np.argsort(line + t / (4.0 * max(float(t.max(initial=0.0)), 1.0)), kind="stable")
     following = np.flatnonzero(line[order][1:] == line[order][:-1])
-    lower, upper = order[following], order[following + 1]
-    return _pairs(
-        vertices[:, 2], faces[triangle[upper]], weights[upper], faces[triangle[lower]], weights[lower]
+    lower, upper = (
+        _on_line(vertices, faces[triangle[chosen]], weights[chosen], start[line[chosen], :2])
+        for chosen in (order[following], order[following + 1])
     )
+    return _pairs(vertices[:, 2], *upper, *lower)
+
+
+def _on_line(
+    vertices: NDArray[np.float64],
+    corners: NDArray[np.int64],
+    weights: NDArray[np.float64],
+    line: NDArray[np.float64],
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return points of triangles, (q, 3) corners and weights, put onto their lines (q, 2) exactly.
+
+    Rays in float32 miss them by a little, which is much in z where a triangle is steep. Of those that are so
+    narrow that the line passes beside them, the weights stay.
+    """
+    x, y = (np.ascontiguousarray(vertices[:, axis])[corners.T] - line[:, axis] for axis in (0, 1))
+    exact = np.stack([x[i - 2] * y[i - 1] - x[i - 1] * y[i - 2] for i in range(3)], axis=1)
+    area = exact.sum(axis=1, keepdims=True)
+    exact /= np.where(area == 0.0, 1.0, area)
+    beside = (area[:, 0] == 0.0) | (np.abs(exact - weights).max(axis=1) > _NARROW)
+    return corners, np.where(beside[:, None], weights, exact)
 
 
 def foot_pairs(

@@ -115,8 +115,18 @@ def pair_places(
     if crossed:
         reasons = [_CROSSED] * len(pairs)
     else:
-        reasons = [_MEET if meet else "" for meet in origin.meet(pairs.upper, pairs.lower)]
+        meet, beside = origin.meet(pairs.upper, pairs.lower), _crossed_beside(pairs, origin)
+        reasons = [_MEET if m else _BESIDE if b else "" for m, b in zip(meet, beside, strict=True)]
     return _listed(kind, vertices, pairs, reasons)
+
+
+def _crossed_beside(pairs: Pairs, origin: Origin) -> NDArray[np.bool_]:
+    """Tell whether the one triangle crossed a neighbour of the other one in the scene, (p,)."""
+    found = np.zeros(len(pairs), dtype=bool)
+    for one, other in ((pairs.upper, pairs.lower), (pairs.lower, pairs.upper)):
+        for corner in range(3):
+            found |= origin.crossed(one, np.repeat(other[:, [corner]], 3, axis=1))
+    return found
 
 
 def gap_places(

@@ -5,19 +5,26 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from o3d_relief.bounds.aligned import aligned_pairs, footprints
 from o3d_relief.bounds.crossings import edges_of
 from o3d_relief.bounds.pairs import Pairs
 
 __all__ = ["silhouette_pairs", "silhouettes"]
 
 _FEWEST_CELLS, _MOST_CELLS = 128, 4096
-"""Raster, along the longer side, in whose cells edges that may cross are looked up: one for each edge."""
+"""Raster, along the longer side, in whose cells edges that may cross are looked up: four for each edge."""
+
+_PIECE = 0.9
+"""Length of the pieces of edges, in cells, at most: with a margin they meet four cells."""
 
 _CLEAR = 1e-3
 """Edges cross in the picture where each reaches this far beyond the other, in relief units."""
 
 _APART = 5e-4
 """Smallest gap in relief units: edges that touch are in no order."""
+
+_BLOCK = 16384
+"""Edges that are worked on at once."""
 
 _CORNERS = np.array([[1, 2, 0], [2, 0, 1], [0, 1, 2]])
 """Of each edge of a triangle: both ends, and the corner opposite."""
@@ -56,7 +63,7 @@ def silhouette_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64]) ->
     Where surfaces have changed places, they did so in a part of the picture that ends where they cross each
     other, or at a silhouette of one of them. So a vertex lies in it, or an edge pierces a triangle at its
     border, or two silhouettes cross at its corner; or the surface has folded over at a silhouette, and the
-    edges of neighbours cross there.
+    edges of neighbours cross there. Silhouettes on top of each other have pairs at their ends.
 
     Parameters
     ----------
@@ -79,7 +86,11 @@ def silhouette_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64]) ->
     """
     edges = edges_of(faces)
     turning = np.isin(edges @ [len(vertices), 1], silhouettes(vertices, faces) @ [len(vertices), 1])
-    far, near = _in_one_cell(vertices, edges, np.flatnonzero(turning)), _in_one_star(faces, edges, turning)
+    # Of edges on top of each other, one tells where all of them cross others.
+    prints = footprints(vertices, faces, edges, np.flatnonzero(turning))
+    stacked = _overlapping(vertices[:, :2], edges, _in_one_cell(vertices, edges, prints.first))
+    far = prints.combined(*_meeting(vertices[:, :2], edges, *stacked)[:2])
+    near = _overlapping(vertices[:, :2], edges, _in_one_star(faces, edges, turning))
     one, other = np.concatenate([far, near], axis=1)
     one, other, share, other_share = _meeting(vertices[:, :2], edges, one, other)
     ends, other_ends = vertices[edges[one], 2], vertices[edges[other], 2]
@@ -95,7 +106,8 @@ def silhouette_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64]) ->
         lower_weights=_weights(lower_share),
         gap=np.abs(height - other_height),
     )
-    return pairs.select(pairs.gap > _APART)
+    aligned = aligned_pairs(vertices, edges, prints, stacked)
+    return Pairs.join([pairs.select(pairs.gap > _APART), aligned])
 
 
 def _in_one_cell(
@@ -104,16 +116,17 @@ def _in_one_cell(
     """Find chosen edges that pass through one cell of a raster: their numbers, (2, q), some twice."""
     low = vertices[:, :2].min(axis=0)
     extent = float(np.ptp(vertices[:, :2], axis=0).max())
-    cells = int(np.clip(np.sqrt(len(chosen)), _FEWEST_CELLS, _MOST_CELLS))
+    cells = int(np.clip(2.0 * np.sqrt(len(chosen)), _FEWEST_CELLS, _MOST_CELLS))
     begin, end = (vertices[edges[chosen], :2] - low).transpose(1, 0, 2) * (cells / max(extent, 1e-30))
     # Edges in pieces that are no longer than a cell: each meets four cells at most.
-    pieces = np.maximum(np.ceil(np.abs(end - begin).max(axis=1)).astype(np.int64), 1)
+    pieces = np.maximum(np.ceil(np.abs(end - begin).max(axis=1) / _PIECE).astype(np.int64), 1)
     edge = np.repeat(np.arange(len(chosen)), pieces)
     number = np.arange(len(edge)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
     step = ((end - begin) / pieces[:, None])[edge]
     first = begin[edge] + step * number[:, None]
-    least = np.floor(np.minimum(first, first + step) - 1e-9).astype(np.int64)
-    most = np.floor(np.maximum(first, first + step) + 1e-9).astype(np.int64)
+    margin = min(_CLEAR * cells / max(extent, 1e-30), (1.0 - _PIECE) / 2.0)
+    least = np.floor(np.minimum(first, first + step) - margin).astype(np.int64)
+    most = np.floor(np.maximum(first, first + step) + margin).astype(np.int64)
     keys = []
     for corner in np.array([[0, 0], [0, 1], [1, 0], [1, 1]]):
         cell = least + corner
@@ -147,6 +160,23 @@ def _within(keys: NDArray[np.int64], n: int) -> NDArray[np.int64]:
     one = np.repeat(np.arange(len(group)), later)
     other = one + 1 + np.arange(len(one)) - np.repeat(np.cumsum(later) - later, later)
     return np.stack([member[one], member[other]])
+
+
+def _overlapping(
+    plane: NDArray[np.float64], edges: NDArray[np.int64], both: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Choose the edges whose boxes in the picture overlap or touch: their numbers, (2, q)."""
+    begin, end = plane[edges].transpose(1, 0, 2)
+    box = np.concatenate([np.minimum(begin, end), -np.maximum(begin, end)], axis=1)
+    turned = np.ascontiguousarray(box[:, [2, 3, 0, 1]])
+    near = np.zeros(both.shape[1], dtype=bool)
+    for block in range(0, both.shape[1], _BLOCK):
+        one, other = both[:, block : block + _BLOCK]
+        beyond = box[one]
+        beyond += turned[other]
+        x, y, back_x, back_y = (beyond <= _CLEAR).T
+        near[block : block + _BLOCK] = x & y & back_x & back_y
+    return both[:, near]
 
 
 def _meeting(

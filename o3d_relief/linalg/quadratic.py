@@ -9,7 +9,10 @@ from numpy.typing import NDArray
 
 __all__ = ["minimise"]
 
-_TOLERANCE = 1e-6
+_TOLERANCE = 1e-3
+"""Share by which the form may lie above its minimum: corrections a thousandth longer do not show."""
+
+_FEASIBLE = 1e-6
 _ITERATIONS = 80
 """A programme that can be fulfilled takes 20 to 60; the rest are mostly those that cannot."""
 
@@ -60,7 +63,9 @@ def minimise(
     settings.verbose = False
     settings.max_iter = _ITERATIONS
     settings.direct_solve_method = "qdldl"
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = _TOLERANCE
+    settings.tol_gap_rel, settings.tol_gap_abs = _TOLERANCE, _FEASIBLE
+    settings.tol_feas = _FEASIBLE
+    settings.iterative_refinement_enable = False  # half of the time, and steps need not be that exact
     solver = clarabel.DefaultSolver(
         _columns(sp.triu(form)),
         -pull,

@@ -14,9 +14,11 @@ from o3d_relief.errors import SolverError
 from o3d_relief.linalg.multigrid import Multigrid, multigrid
 from o3d_relief.progress import Tick, silent
 
-__all__ = ["multigrid", "solve_direct", "solve_spd"]
+__all__ = ["FACTORISED_UP_TO", "multigrid", "solve_direct", "solve_spd"]
 
-_DIRECT_UP_TO = 4000
+FACTORISED_UP_TO = 4000
+"""Unknowns up to which any system is factorised."""
+
 _MAX_ITERATIONS = 1000
 
 _LOOK_BACK = 6
@@ -31,6 +33,7 @@ def solve_spd(
     right_hand_side: NDArray[np.float64],
     *,
     similar: sp.csr_array | None = None,
+    direct_up_to: int = FACTORISED_UP_TO,
     tolerance: float = 1e-12,
     error: float = 0.0,
     start: NDArray[np.float64] | None = None,
@@ -38,7 +41,7 @@ def solve_spd(
 ) -> NDArray[np.float64]:
     """Solve A x = b for a sparse symmetric positive definite A.
 
-    Up to 4,000 unknowns by a sparse LU, above by conjugate gradients, preconditioned with smoothed
+    Up to 4,000 unknowns by a sparse factorisation, above by conjugate gradients, preconditioned with smoothed
     aggregation multigrid, whose cost and memory grow linearly. The result does not depend on the number
     of threads: sums are taken on one.
 
@@ -49,6 +52,8 @@ def solve_spd(
     similar : (n, n) sparse float64, optional
         A second-order operator that is spectrally close to `matrix`, to build the multigrid on;
         `matrix` itself where omitted.
+    direct_up_to : int
+        Unknowns up to which the matrix is factorised; systems of many small bodies have sparse factors.
     tolerance : float
         Norm of the residual relative to that of `right_hand_side` at which the iteration stops.
     error : float
@@ -77,8 +82,8 @@ def solve_spd(
         return np.zeros(n)
     left = np.inf
     with threadpool_limits(limits=1):
-        if n <= _DIRECT_UP_TO:
-            solution = solve_direct(matrix, right_hand_side)
+        if n <= direct_up_to:
+            solution = solve_direct(matrix, right_hand_side, definite=True)
         else:
             cycle = Multigrid(matrix if similar is None else similar)
             start = np.zeros(n) if start is None else start
@@ -97,13 +102,17 @@ def solve_spd(
     return np.asarray(solution, dtype=np.float64)
 
 
-def solve_direct(matrix: sp.csr_array, right_hand_side: NDArray[np.float64]) -> NDArray[np.float64]:
+def solve_direct(
+    matrix: sp.csr_array, right_hand_side: NDArray[np.float64], *, definite: bool = False
+) -> NDArray[np.float64]:
     """Solve A x = b for a sparse A of any condition, by an LU factorisation.
 
     Parameters
     ----------
     matrix : (n, n) sparse float64
     right_hand_side : (n,) float64
+    definite : bool
+        It is symmetric positive definite: no pivots have to be looked for, which is faster.
 
     Returns
     -------
@@ -117,7 +126,8 @@ def solve_direct(matrix: sp.csr_array, right_hand_side: NDArray[np.float64]) -> 
     if len(right_hand_side) == 0:
         return np.zeros(0)
     try:
-        factor = sla.splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A")
+        options = {"SymmetricMode": True, "DiagPivotThresh": 0.0} if definite else {}
+        factor = sla.splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", options=options)
     except RuntimeError as error:  # SuperLU: exactly singular
         raise SolverError(f"A linear system of {len(right_hand_side)} unknowns is singular.") from error
     return np.asarray(factor.solve(right_hand_side), dtype=np.float64)

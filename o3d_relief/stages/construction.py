@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from o3d_relief.linalg.solve import solve_spd
+from o3d_relief.linalg.solve import FACTORISED_UP_TO, solve_spd
 from o3d_relief.progress import Tick, silent
 
 __all__ = ["Construction", "construct", "leaders"]
@@ -19,6 +19,10 @@ __all__ = ["Construction", "construct", "leaders"]
 _EXACT = 1e-6
 """Energy norm of the error, in relief units, to which the displacement is solved: heights are then exact to
 1e-8 of the extent."""
+
+_SMALL_PART = 20000
+_FEW_UNKNOWNS = 200000
+"""Scenes of no part with more vertices, and of no more unknowns, are factorised: their factors are sparse."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -126,13 +130,18 @@ def _solve_free(
     free = np.flatnonzero(free_mask)
     rows = laplacian[free]
     right_hand_side = np.zeros(len(free))
+    direct_up_to = FACTORISED_UP_TO
     if springs is not None:
+        if np.bincount(connected_components(laplacian, directed=False)[1]).max() <= _SMALL_PART:
+            direct_up_to = _FEW_UNKNOWNS
         form, pull = springs
         rows = (rows + form[free]).tocsr()
         right_hand_side = pull[free]
     displacement[free] = 0.0
     right_hand_side = right_hand_side - rows @ displacement
-    displacement[free] = solve_spd(rows[:, free].tocsr(), right_hand_side, error=_EXACT, tick=tick)
+    displacement[free] = solve_spd(
+        rows[:, free].tocsr(), right_hand_side, direct_up_to=direct_up_to, error=_EXACT, tick=tick
+    )
 
 
 def _move_loose(

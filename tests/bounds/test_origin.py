@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 import trimesh
 
 from o3d_relief.bounds.origin import Origin, triangles_cross
@@ -47,3 +48,54 @@ def test_places_stand_for_all_triangles_around_them():
 def _touches(faces, scene, a, b):
     around_a, around_b = faces[(faces == a).any(axis=1)], faces[(faces == b).any(axis=1)]
     return any(triangles_cross(scene[[p]], scene[[q]])[0] for p in around_a for q in around_b)
+
+
+_FLAT = np.array([[0.0, 0, 0], [4, 0, 0], [0, 4, 0]])
+
+
+@pytest.mark.parametrize(
+    ("corners", "crosses"),
+    [
+        pytest.param([[2, 2, -1], [-2, 2, 1], [2, -2, 1]], True, id="an edge through its inside"),
+        pytest.param(
+            [[0, 0, -1], [0, 0, 1], [4, 4, 0]], True, id="an edge through a corner, over the inside"
+        ),
+        pytest.param([[2, 0, -1], [2, 0, 1], [2, 2, 0]], True, id="edge through edge, twice"),
+        pytest.param([[0, 0, 0], [4, 4, -1], [4, 4, 1]], True, id="corner on corner, edge beyond the other"),
+        pytest.param([[1, 1, 0], [4, 4, -1], [4, 4, 1]], True, id="corner on the face, through its border"),
+        pytest.param([[0, 2, -1], [0, 2, 1], [4, 2, 0]], True, id="edge through edge, and out beyond"),
+        pytest.param([[2, 0, -1], [2, 0, 1], [2, -2, 0]], False, id="edge through edge, to the outside"),
+        pytest.param([[1, 1, 0], [1, 1, 2], [2, 1, 2]], False, id="corner on face"),
+        pytest.param([[1, 1, 0], [2, 1, 0], [2, 1, 2]], False, id="edge on face"),
+        pytest.param([[0, 0, 0], [4, 0, 0], [0, 0, 4]], False, id="edge on edge, the whole"),
+        pytest.param([[1, 0, 0], [2, 0, 0], [1, 2, 1]], False, id="edge on edge, a part"),
+        pytest.param([[1, 0, 0], [2, -1, 1], [2, -1, -1]], False, id="corner on edge, from outside"),
+        pytest.param([[0, 0, 0], [-1, -1, 1], [-1, -1, -1]], False, id="corner on corner"),
+        pytest.param([[0, 0, 0], [4, 0, 0], [0, 4, 0]], False, id="the same triangle"),
+        pytest.param([[1, 1, 0], [9, 1, 0], [1, 9, 0]], False, id="in one plane"),
+        pytest.param([[1, 1, 1e-6], [9, 1, 1e-6], [1, 9, 1e-6]], False, id="just above"),
+        pytest.param([[2, 2, 2], [2, 2, 2], [2, 2, -2]], False, id="without an area"),
+    ],
+)
+def test_exact_contacts(corners, crosses):
+    corners = np.array(corners, dtype=float)
+    rng = np.random.default_rng(3)
+    for i in range(12):
+        turn = np.eye(3) if i == 0 else np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        one, other = (
+            np.roll(places, i, axis=0)[:: 1 if i % 2 else -1] @ turn + i for places in (_FLAT, corners)
+        )
+        assert triangles_cross(one[None], other[None]).tolist() == [crosses]
+        assert triangles_cross(other[None], one[None]).tolist() == [crosses]
+
+
+def test_sheets_that_cross_along_lines_of_their_meshes_touch_and_sheets_whose_edges_cross_do_cross():
+    """Along a line of both meshes, all triangles have an order; elsewhere edges pass through edges."""
+    for shift, crosses in ((0.0, False), (3.0, True)):
+        vertices, faces = grid(9, size=80)
+        sheets = [vertices + np.outer(s * (vertices[:, 0] - shift), [0, 0, 1]) for s in (1.0, -1.0)]
+        one, other = (
+            np.repeat(sheets[0][faces], len(faces), axis=0),
+            np.tile(sheets[1][faces], (len(faces), 1, 1)),
+        )
+        assert triangles_cross(one, other).any() == crosses

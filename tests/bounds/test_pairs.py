@@ -66,3 +66,14 @@ def test_what_is_too_close_for_the_next_surface(gap, there):
     assert (len(pairs) >= 25) == there  # every vertex of the smaller plate
     assert pairs.gap == pytest.approx(gap, abs=2e-5)
     assert (len(vertex_pairs(vertices, faces)) > 0) == (gap > 1e-3)
+
+
+def test_lines_of_the_grid_meet_steep_triangles_exactly():
+    """Rays in float32 miss a line by 1e-5 here, which a slope of 50 makes 5e-4 in z."""
+    vertices, faces = grid(9)
+    steep = np.column_stack([vertices[:, :2] + 1e3 / 7, 50.0 * vertices[:, 0]])
+    others, other_faces = grid(8)
+    above = np.column_stack([others[:, :2] + 1e3 / 7, 50.0 * others[:, 0] + 3.0])
+    pairs = grid_pairs(*joined((steep, faces), (above, other_faces)), side=37)
+    assert len(pairs) == 37 * 37
+    assert pairs.gap == pytest.approx(3.0, abs=1e-9)
