@@ -177,6 +177,9 @@ def crossings(vertices: NDArray[np.float64], faces: NDArray[np.int64], edges: ND
         Candidates found by rays in float32; `Crossings.pierced` tells exactly. An edge and a triangle that
         share a vertex do not count, nor do triangles that stand upright on S: nothing is above them.
     """
+    none = np.zeros(0, dtype=np.int64)
+    if len(edges) == 0:  # all that is left of the relief has shrunk to lines
+        return _stretches(vertices[:, :2], edges[none], faces[none])
     scene, middle, size = unit_box(vertices, faces)
     start, end = vertices[edges[:, 0]], vertices[edges[:, 1]]
     rays = np.concatenate([(start - middle) / size, (end - start) / size], axis=1).astype(np.float32)
@@ -184,7 +187,6 @@ def crossings(vertices: NDArray[np.float64], faces: NDArray[np.int64], edges: ND
     meets = scene.test_occlusions(o3d.core.Tensor(rays), tnear=_INSIDE, tfar=1.0 - _INSIDE).numpy()
     candidates = np.flatnonzero(meets)
     if len(candidates) == 0:  # Open3D dies of a list without rays
-        none = np.zeros(0, dtype=np.int64)
         return _stretches(vertices[:, :2], edges[none], faces[none])
     hits = scene.list_intersections(o3d.core.Tensor(rays[candidates]))
     t = hits["t_hit"].numpy()

@@ -90,3 +90,9 @@ def test_shallow_crossings_are_seen_where_asked_for():
     found = _found(shape)
     assert found.pierced(shape[0][:, 2], deep=1e-4).any()
     assert not found.pierced(shape[0][:, 2]).any()
+
+
+def test_nothing_crosses_where_no_triangle_is_left():
+    found = _found((np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)))
+    assert len(found) == 0
+    assert len(found.pierced(np.zeros(0))) == 0
