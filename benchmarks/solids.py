@@ -42,6 +42,7 @@ COLUMNS = [
     "closed",
     "capped",
     "to_plate",
+    "filled",
     "thickened",
     "relief_s",
     "solid_s",
@@ -82,7 +83,8 @@ def row_of(name: str, solid: rel.Solid, params: rel.PlateParams, seconds: tuple[
     good = mesh.is_watertight and mesh.is_winding_consistent and mesh.volume > 0
     good = good and off < 0.01 and back_off < 1e-6 and report.verdict != "fail"
     parts = [
-        f"{solid.counts[f'parts_{how}']:.0f}" for how in ("closed", "capped", "to_the_plate", "thickened")
+        f"{solid.counts[f'parts_{how}']:.0f}"
+        for how in ("closed", "capped", "to_the_plate", "filled", "thickened")
     ]
     return [
         name, params.shape, str(len(mesh.faces)), str(mesh.is_watertight), str(mesh.is_winding_consistent),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -60,8 +61,8 @@ def write_stages(folder: Path, relief: Relief) -> None:
     )
 
 
-def tell_result(path: Path, relief: Relief, seconds: float, *, solid: bool = False) -> None:
-    """Write what came out."""
+def tell_result(path: Path, relief: Relief, seconds: float, *, solids: Sequence[Path] = ()) -> None:
+    """Write what came out: the relief, or the files of its solid."""
     report = relief.summary()
     counts = {name: count for record in relief.stages.values() for name, count in record.counts.items()}
     if counts.get("already_shallower"):
@@ -73,8 +74,11 @@ def tell_result(path: Path, relief: Relief, seconds: float, *, solid: bool = Fal
             tell(f"{left} pairs of surfaces could not be brought back into order; a smaller k may help")
     if missed := counts.get("attached_missed", 0):
         tell(f"{missed} vertices could not be attached to the plane: something seen lies behind them")
-    if solid:
-        tell(f"{path}: the solid, {seconds:.1f} s in all")
+    if len(solids) > 1:
+        tell(f"{solids[0]} to {solids[-1].name}: {len(solids)} tiles, {seconds:.1f} s in all")
+        return
+    if solids:
+        tell(f"{solids[0]}: the solid, {seconds:.1f} s in all")
         return
     tell(
         f"{path}: {report['vertices']} vertices, {report['triangles']} triangles; "

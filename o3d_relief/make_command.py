@@ -93,12 +93,13 @@ def make(options: argparse.Namespace) -> int:
         raise MeshError(f"{options.input}: {error}") from error
     finally:
         bar.close()
-    _write(options, relief, made, taken)
-    tell_result(options.output, relief, time.perf_counter() - started, solid=made is not None)
+    solids = _write(options, relief, made, taken)
+    tell_result(options.output, relief, time.perf_counter() - started, solids=solids)
     return 3 if options.strict and made is not None and made.report.verdict != "pass" else 0
 
 
-def _write(options: argparse.Namespace, relief: Relief, made: Made | None, taken: set[Path]) -> None:
+def _write(options: argparse.Namespace, relief: Relief, made: Made | None, taken: set[Path]) -> list[Path]:
+    """Write all files, and return those of the solid."""
     from o3d_relief.progress_bar import shown
     from o3d_relief.scene.write import write_mesh
     from o3d_relief.workshop import write_work
@@ -110,17 +111,19 @@ def _write(options: argparse.Namespace, relief: Relief, made: Made | None, taken
         raise ReliefError(f"{options.output} is not written (--strict): {relief.certificate.failures[0]}")
     if options.strict and made is not None and made.report.failures:
         raise ReliefError(f"{options.output} is not written (--strict): {made.report.failures[0]}")
+    solids: list[Path] = []
     with shown("writing"):
         if made is None:
             write_mesh(options.output, relief.mesh)
         else:
-            write_work(options.output, made.work, height_map=options.height_map, taken=taken)
+            solids = write_work(options.output, made.work, height_map=options.height_map, taken=taken)
     if options.report is not None:
         write_report(options.report, relief, made)
     if options.walls is not None and made is not None:
         made.draw_walls(options.walls)
     if options.stages is not None:
         write_stages(options.stages, relief)
+    return solids
 
 
 def read_scene(path: Path, scan: ScanParams) -> tuple[TriangleMesh | PointCloud, ScanParams | None]:

@@ -113,7 +113,8 @@ def tell_estimate(
     depth = f"{z:.2f}" if found.depth_known else f"at most {z:.2f}"
     tell(f"size      {x:.2f} x {y:.2f} x {depth} mm")
     tell(f"volume    about {found.volume_mm3 / 1000.0:.0f} cm3")
-    tell(f"triangles about {found.triangles}")
+    finer = ", more where textures become colours" if mesh.has_textures() else ""
+    tell(f"triangles about {found.triangles}{finer}")
     tell(f"memory    about {found.memory_mb / 1000.0:.1f} GB")
 
 

@@ -147,12 +147,12 @@ def tile_files(output: Path, tiling: Tiling) -> dict[Path, Solid]:
 def write_work(
     output: Path, work: Work, *, height_map: Path | None, taken: Collection[Path] = ()
 ) -> list[Path]:
-    """Write the solid, its tiles beside it, and the height map.
+    """Write the solid, or the tiles that it is cut into, and the height map.
 
     Parameters
     ----------
     output : Path
-        Of the whole piece.
+        Of the whole piece; where it is cut, the tiles have this name and their numbers.
     work : Work
     height_map : Path or None
     taken : collection of Path
@@ -161,7 +161,7 @@ def write_work(
     Returns
     -------
     list of Path
-        The files, the whole piece first.
+        The files of solids: that of the piece, or those of its tiles.
 
     Raises
     ------
@@ -176,5 +176,6 @@ def write_work(
             raise FileError(f"The tile {path} would replace a file that is needed: choose another output.")
     if height_map is not None and work.field is not None:
         write_height_map(height_map, work.field)
-    write_solids(output, {**{path.name: solid for path, solid in tiles.items()}, output.name: work.solid})
-    return [output, *tiles, *([] if height_map is None else [height_map])]
+    solids = tiles or {output: work.solid}
+    write_solids(output, {path.name: solid for path, solid in solids.items()})
+    return list(solids)

@@ -49,7 +49,7 @@ def add_workshop(command: argparse.ArgumentParser) -> None:
 
     add = command.add_argument_group("tiles", "for pieces larger than the printer").add_argument
     add("--tile", type=_tile_size, metavar="WxH",
-        help="also write the piece cut into tiles of at most this size in mm, as OUTPUT_1, OUTPUT_2, ...",
+        help="cut the piece into tiles of at most this size in mm: OUTPUT_1, OUTPUT_2, ... instead of OUTPUT",
     )  # fmt: skip
     add("--pin-mm", type=float, metavar="MM",
         help="diameter of the pins (default: half the plate's thickness, at most 6)")  # fmt: skip

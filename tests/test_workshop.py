@@ -65,20 +65,23 @@ def test_height_map_alone_leaves_the_solid_as_it_is(tmp_path, scene):
     assert (tmp_path / "map.tif").exists()
 
 
-def test_tiles_are_written_beside_the_whole(tmp_path, scene, capsys):
+def test_tiles_are_written_instead_of_the_whole(tmp_path, scene, capsys):
     out, report = tmp_path / "relief.stl", tmp_path / "report.json"
     assert _run("make", scene, out, *SMALL, "--tile", "50x60", "--report", report) == 0
     told = json.loads(report.read_text())["tiles"]
     names = [f"relief_{number}.stl" for number in range(1, told["tiles"] + 1)]
-    assert _names(tmp_path) == ["relief.stl", *names, "report.json"]
-    whole = trimesh.load(out)
+    assert _names(tmp_path) == [*names, "report.json"]
     tiles = [trimesh.load(tmp_path / name) for name in names]
     for tile, size in zip(tiles, told["sizes_mm"], strict=True):
         assert tile.is_watertight
         assert (tile.extents[:2] <= [50.0, 60.0]).all()
         np.testing.assert_allclose(tile.extents, size, atol=0.01)
+    err = capsys.readouterr().err
+    assert f"{told['tiles']} tiles in" in err
+    assert f"{tmp_path / names[0]} to {names[-1]}: {told['tiles']} tiles, " in err
+    assert _run("make", scene, out, *SMALL) == 0
+    whole = trimesh.load(out)
     assert sum(tile.volume for tile in tiles) == pytest.approx(whole.volume, rel=0.01)
-    assert f"{told['tiles']} tiles in" in capsys.readouterr().err
 
 
 def test_a_piece_that_fits_is_not_cut(tmp_path, scene, capsys):

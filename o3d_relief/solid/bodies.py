@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from o3d_relief.plate_params import PlateParams
 from o3d_relief.rays import unit_box
+from o3d_relief.solid.body import built
+from o3d_relief.solid.chain import bodies
 from o3d_relief.solid.plate import as_plate
 
 if TYPE_CHECKING:
@@ -36,28 +38,70 @@ def joined(whole: manifold3d.Manifold, params: PlateParams) -> tuple[manifold3d.
     """
     import manifold3d
 
-    pieces = whole.decompose()
-    volumes = np.array([piece.volume() for piece in pieces])
+    mesh = whole.to_mesh64()
+    properties, corners = np.asarray(mesh.vert_properties), np.asarray(mesh.tri_verts).astype(np.int64)
+    target = np.arange(len(properties))
+    target[np.asarray(mesh.merge_from_vert, dtype=np.int64)] = np.asarray(mesh.merge_to_vert, dtype=np.int64)
+    label = bodies(target[corners])
+    volumes, rear = _measured(properties[:, :3], corners, label)
     crumb = (volumes > 0.0) & (volumes < params.nozzle_mm**3) & (volumes < volumes.max())
-    kept_rows = np.flatnonzero((volumes > 0.0) & ~crumb)
-    solid, size = [pieces[row] for row in kept_rows], volumes[kept_rows]
+    solid = (volumes > 0.0) & ~crumb
     counts = {"voids_filled": float((volumes <= 0.0).sum()), "crumbs": float(crumb.sum())}
     # The plate is the rearmost; without one, the largest body is the main one.
-    rear = np.array([piece.bounding_box()[2] for piece in solid])
-    main = int(np.lexsort((-size, rear if params.shape != "none" else np.zeros(len(size))))[0])
-    loose = [piece for number, piece in enumerate(solid) if number != main]
-    counts["loose_bodies"] = float(len(loose))
-    counts["loose_mm3"] = float(size.sum() - size[main])
-    kept = [solid[main], *loose]
+    kept = np.flatnonzero(solid)
+    key = rear[kept] if params.shape != "none" else np.zeros(len(kept))
+    main = int(kept[np.lexsort((-volumes[kept], key))[0]])
+    counts["loose_bodies"] = float(len(kept) - 1)
+    counts["loose_mm3"] = float(volumes[kept].sum() - volumes[main])
+    counts["pins"] = 0.0
     if params.loose == "remove":
-        kept = kept[:1]
-    pins: list[manifold3d.Manifold] = []
-    if params.loose == "bridge" and loose:
-        pins = _pins(solid[main], loose, params)
-    counts["pins"] = float(len(pins))
-    if len(pieces) == 1 or (len(kept) == len(pieces) and not pins):
+        kept = np.array([main])
+    if len(kept) == len(volumes) and (params.loose == "report" or len(kept) == 1):
         return whole, counts
-    return manifold3d.Manifold.batch_boolean([*kept, *pins], manifold3d.OpType.Add), counts
+    # What is loose may lie in what was a void.
+    together = params.loose == "report" and (len(kept) == 1 or not (volumes <= 0.0).any())
+    others = [np.array([number]) for number in kept if number != main]
+    groups = [kept] if together or not others else [np.array([main]), *others]
+    made = [_only(properties, corners, target, np.isin(label, group)) for group in groups]
+    if params.loose == "bridge" and len(made) > 1:
+        pins = _pins(made[0], made[1:], params)
+        counts["pins"] = float(len(pins))
+        made += pins
+    if len(made) == 1:
+        # manifold3d may part what touched itself in a vertex only.
+        result, more = joined(made[0], params)
+        told = (
+            counts
+            if params.loose == "remove"
+            else {name: counts[name] for name in ("voids_filled", "crumbs")}
+        )
+        return result, {name: value + told.get(name, 0.0) for name, value in more.items()}
+    return manifold3d.Manifold.batch_boolean(made, manifold3d.OpType.Add), counts
+
+
+def _measured(
+    places: NDArray[np.float64], corners: NDArray[np.int64], label: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the volume of each body (b,) and its lowest z."""
+    a, b, c = places[corners].transpose(1, 0, 2)
+    volumes = np.bincount(label, weights=np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0)
+    rear = np.full(len(volumes), np.inf)
+    np.minimum.at(rear, label, places[corners, 2].min(axis=1))
+    return np.asarray(volumes, dtype=np.float64), rear
+
+
+def _only(
+    properties: NDArray[np.float64],
+    corners: NDArray[np.int64],
+    target: NDArray[np.int64],
+    rows: NDArray[np.bool_],
+) -> manifold3d.Manifold:
+    """Make a manifold of some faces; vertices that are merged into another one come with it."""
+    used = np.unique(np.concatenate([corners[rows], target[corners[rows]]]))
+    number = np.full(len(properties), -1)
+    number[used] = np.arange(len(used))
+    merged = used[target[used] != used]
+    return built(properties[used], number[corners[rows]], number[merged], number[target[merged]])
 
 
 def _pins(

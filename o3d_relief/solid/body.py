@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import manifold3d
     import open3d as o3d
 
-__all__ = ["PLATE_COLOR", "Solid", "manifold_of"]
+__all__ = ["PLATE_COLOR", "Solid", "built", "manifold_of"]
 
 PLATE_COLOR = (0.8, 0.79, 0.77)
 """sRGB colour of everything that is not the relief's own surface, where the relief has colours."""
@@ -127,7 +127,7 @@ class Solid:
         """
         place, rgb, plate, corners = self.seam_split()
         twins = np.flatnonzero(place[1:] == place[:-1]) + 1
-        return _build(np.column_stack([self.vertices[place], rgb, plate]), corners, twins, twins - 1)
+        return built(np.column_stack([self.vertices[place], rgb, plate]), corners, twins, twins - 1)
 
     def seam_split(
         self,
@@ -226,17 +226,16 @@ def manifold_of(
     """
     rgb = np.broadcast_to(np.asarray(PLATE_COLOR if colors is None else colors), (len(vertices), 3))
     none = np.zeros(0, dtype=np.int64)
-    return _build(
-        np.column_stack([vertices, rgb, np.full(len(vertices), float(is_plate))]), faces, none, none
-    )
+    return built(np.column_stack([vertices, rgb, np.full(len(vertices), float(is_plate))]), faces, none, none)
 
 
-def _build(
+def built(
     properties: NDArray[np.float64],
     faces: NDArray[np.int64],
     merge_from: NDArray[np.int64],
     merge_to: NDArray[np.int64],
 ) -> manifold3d.Manifold:
+    """Hand vertices (n, 7), with the properties of a Solid's manifold, and what to merge to manifold3d."""
     import manifold3d
 
     mesh = manifold3d.Mesh64(

@@ -18,8 +18,9 @@ from o3d_relief.solid.bodies import joined
 from o3d_relief.solid.body import Solid, manifold_of
 from o3d_relief.solid.parts import closed_parts
 from o3d_relief.solid.pieces import Piece
-from o3d_relief.solid.plate import outline, plate, pockets
+from o3d_relief.solid.plate import as_plate, outline, plate, pockets
 from o3d_relief.solid.refine import refined_for_texture
+from o3d_relief.solid.silhouette import rough_silhouette
 from o3d_relief.solid.sizes import fitted, shortfall, to_millimetres
 from o3d_relief.solid.surface_colors import surface_colors
 from o3d_relief.solid.walls import with_thicker_walls
@@ -34,6 +35,14 @@ _EXACT = 1e-9
 """Share of a length by which it may be off."""
 _COLOR_MM = 0.8
 """Longest edge where a texture changes: colours of prints are not much finer."""
+_SQUARE_MM = 0.5
+"""Of the silhouette of what is that rough."""
+_CELL_MM = 4.0
+"""Longest edge of the plate's faces under outlines of ten thousands of corners.
+
+Each face of the plate is cut and triangulated by itself: where two outlines touch, as rough ones do, the
+triangles may lie over each other, but not further than this.
+"""
 
 
 def make_solid(
@@ -111,7 +120,8 @@ def solid_of(mesh: MeshArrays, params: PlateParams, *, tick: Tick = silent) -> S
     for _ in range(_ATTEMPTS):
         tick(0.5)
         pieces = fitted(parts.pieces, params, wide=wide, deep=deep)
-        whole, settled = joined(_on_plate(pieces, colors, params), params)
+        fine = parts.counts["filled"] > 0
+        whole, settled = joined(_on_plate(pieces, colors, params, fine=fine), params)
         wider, deeper = shortfall(whole.bounding_box(), params)
         if abs(wider - 1.0) < _EXACT and abs(deeper - 1.0) < _EXACT:
             break
@@ -124,23 +134,32 @@ def solid_of(mesh: MeshArrays, params: PlateParams, *, tick: Tick = silent) -> S
 
 
 def _on_plate(
-    pieces: Sequence[Piece], colors: NDArray[np.float64] | None, params: PlateParams
+    pieces: Sequence[Piece], colors: NDArray[np.float64] | None, params: PlateParams, *, fine: bool
 ) -> manifold3d.Manifold:
-    """Unite everything."""
+    """Unite everything; `fine` makes small faces of the plate."""
     import manifold3d
 
     body = _united(pieces, colors)
     # The back of a shell may reach further down than the plate is thick.
     lowest = 0.0 if params.shape == "none" else -(params.embed_mm + params.base_mm) / 2.0
     if body.bounding_box()[2] < lowest:
-        body = body.trim_by_plane((0.0, 0.0, 1.0), lowest)
+        body = body - _below(lowest, body) if fine else body.trim_by_plane((0.0, 0.0, 1.0), lowest)
     main, shape = body, manifold3d.CrossSection()
     if params.shape != "none":
-        shape = outline(_silhouette(pieces, body, params), params)
-        main = plate(shape, params) + body
+        shape = outline(_silhouette(pieces, body, params, fine=fine), params)
+        under = plate(shape, params)
+        main = (under.refine_to_length(_CELL_MM) if fine else under) + body
     if params.thicken:
         main = with_thicker_walls(Solid.from_manifold(main, colored=colors is not None), params.min_wall_mm)
     return main if params.hanging == "none" else main - pockets(shape, params)
+
+
+def _below(top: float, body: manifold3d.Manifold) -> manifold3d.Manifold:
+    """Return a box around all of a body that lies below z = `top`."""
+    low_x, low_y, low_z, high_x, high_y, _ = body.bounding_box()
+    size = (high_x - low_x + 2.0, high_y - low_y + 2.0, top - low_z + 1.0)
+    corner = (low_x - 1.0, low_y - 1.0, low_z - 1.0)
+    return as_plate(type(body).cube(size).translate(corner).refine_to_length(_CELL_MM))
 
 
 def _united(pieces: Sequence[Piece], colors: NDArray[np.float64] | None) -> manifold3d.Manifold:
@@ -159,11 +178,13 @@ def _united(pieces: Sequence[Piece], colors: NDArray[np.float64] | None) -> mani
 
 
 def _silhouette(
-    pieces: Sequence[Piece], body: manifold3d.Manifold, params: PlateParams
+    pieces: Sequence[Piece], body: manifold3d.Manifold, params: PlateParams, *, fine: bool
 ) -> manifold3d.CrossSection:
     """Return what the relief covers seen from the front; its convex hull where the shape needs no more."""
     import manifold3d
 
+    if params.shape == "contour" and fine:
+        return rough_silhouette(pieces, _SQUARE_MM)
     if params.shape == "contour":
         return manifold3d.CrossSection(body.project().to_polygons(), manifold3d.FillRule.Positive)
     points = np.concatenate([piece.vertices[:, :2] for piece in pieces])

@@ -17,9 +17,10 @@ from o3d_relief.solid.chain import (
     without_opposites,
 )
 from o3d_relief.solid.closing import caps, lowered
+from o3d_relief.solid.filling import filled_behind
 from o3d_relief.solid.orient import oriented
 from o3d_relief.solid.pieces import Piece
-from o3d_relief.solid.thicken import shells
+from o3d_relief.solid.thicken import charts, shells
 
 __all__ = ["ClosedParts", "closed_parts"]
 
@@ -29,6 +30,8 @@ _CAP_SEEN = 0.05
 """... and make up at most this share of what the viewer sees of it."""
 _HEIGHT_FIELD = 0.95
 """A surface counts as a height field if its faces turn to the viewer but for this share."""
+_MOST_CHARTS = 100
+"""What falls into more nearly flat pieces is too rough for a wall of even thickness behind it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -40,8 +43,8 @@ class ClosedParts:
     pieces : tuple of Piece
         Each without boundary and with positive volume.
     counts : dict of str to int
-        Parts that were closed already (but for their foot), capped, closed towards the plate, thickened,
-        and left out because they have no volume.
+        Parts that were closed already (but for their foot), capped, closed towards the plate, filled from
+        behind, thickened, and left out because they have no volume.
     """
 
     pieces: tuple[Piece, ...]
@@ -54,7 +57,8 @@ def closed_parts(
     """Close the parts of a trimmed relief.
 
     A part that ends at S only goes on straight down to the floor and is closed there. Of the others, one that
-    lacks little is capped; a height field is closed towards the plate; anything else gets thickness.
+    lacks little is capped; a height field is closed towards the plate; what is rough, as scans are, is filled
+    from its faces back to the next air; anything else gets thickness.
 
     Parameters
     ----------
@@ -77,7 +81,8 @@ def closed_parts(
     part = separate_parts(piece.faces)
     order = np.argsort(part, kind="stable")
     pieces: list[Piece] = []
-    counts = {"closed": 0, "capped": 0, "to_the_plate": 0, "thickened": 0, "without_volume": 0}
+    counts = {"closed": 0, "capped": 0, "to_the_plate": 0, "filled": 0, "thickened": 0}
+    counts["without_volume"] = 0
     counts["faces_turned"] = turned
     for rows in np.split(order, np.flatnonzero(np.diff(part[order])) + 1):
         how, closed = _closed(piece.only(np.sort(rows)), floor, thickness)
@@ -128,6 +133,11 @@ def _closed(piece: Piece, floor: float, thickness: float) -> tuple[str, list[Pie
         closed = down.with_faces(*caps(down, boundary(down.faces)))
         if volume(closed.vertices, closed.faces) > 0.0:
             return "to_the_plate", [closed]
-    return "thickened", [
-        shell for shell in shells(piece, thickness) if volume(shell.vertices, shell.faces) > 0.0
-    ]
+    if charts(piece).max() + 1 > _MOST_CHARTS:
+        without_foot = piece.only((piece.vertices[piece.faces, 2] > floor).all(axis=1))
+        return "filled", _with_volume(filled_behind(without_foot, floor))
+    return "thickened", _with_volume(shells(piece, thickness))
+
+
+def _with_volume(pieces: list[Piece]) -> list[Piece]:
+    return [piece for piece in pieces if volume(piece.vertices, piece.faces) > 0.0]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from o3d_relief.scene.arrays import MeshArrays
 from o3d_relief.scene.weld import first_of_equal_rows
+from o3d_relief.solid.halving import halved
 from o3d_relief.solid.texture_ranges import Ranges
 
 __all__ = ["refined_for_texture"]
@@ -92,11 +93,8 @@ def _halved(mesh: MeshArrays, longest: float, rich: NDArray[np.bool_]) -> MeshAr
     long &= needed[edge]
     if not long.any() or mesh.triangle_uvs is None or mesh.material_ids is None:
         return None
-    low, high = ends.min(axis=2)[long], ends.max(axis=2)[long]
-    pairs, number = np.unique(low * len(mesh.vertices) + high, return_inverse=True)
-    first, second = pairs // len(mesh.vertices), pairs % len(mesh.vertices)
-    middle = np.full(faces.shape, -1)
-    middle[long] = len(mesh.vertices) + number.ravel()
+    split = halved(faces, long, len(mesh.vertices))
+    first, second = split.pairs.T
 
     def grown(values: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
         if values is None:
@@ -104,44 +102,15 @@ def _halved(mesh: MeshArrays, longest: float, rich: NDArray[np.bool_]) -> MeshAr
         return np.concatenate([values, (values[first] + values[second]) / 2.0])
 
     # Six corners of each face: its own, and the middles of its edges.
-    corners = np.concatenate([faces, middle], axis=1)
     uvs = mesh.triangle_uvs.reshape(-1, 3, 2)
     six_uvs = np.concatenate([uvs, (uvs + np.roll(uvs, -1, axis=1)) / 2.0], axis=1)
-    new_faces, new_uvs, source = [], [], []
-    for case, triangles in _PATTERNS.items():
-        mine = np.flatnonzero((long == case).all(axis=1))
-        for triangle in triangles:
-            new_faces.append(corners[mine][:, triangle])
-            new_uvs.append(six_uvs[mine][:, triangle])
-            source.append(mine)
-    order = np.argsort(np.concatenate(source), kind="stable")
     vertices = grown(mesh.vertices)
     return replace(
         mesh,
         vertices=mesh.vertices if vertices is None else vertices,
-        faces=np.concatenate(new_faces)[order],
+        faces=split.faces,
         colors=grown(mesh.colors),
         normals=grown(mesh.normals),
-        triangle_uvs=np.concatenate(new_uvs)[order].reshape(-1, 2),
-        material_ids=mesh.material_ids[np.concatenate(source)[order]],
+        triangle_uvs=six_uvs[split.source[:, None], split.corners].reshape(-1, 2),
+        material_ids=mesh.material_ids[split.source],
     )
-
-
-def _patterns() -> dict[tuple[bool, bool, bool], list[list[int]]]:
-    """Return the triangles of each case of edges that are halved: corners 0 to 2, middles 3 to 5."""
-    first = {
-        (False, False, False): [[0, 1, 2]],
-        (True, False, False): [[0, 3, 2], [3, 1, 2]],
-        (True, True, False): [[3, 1, 4], [0, 3, 4], [0, 4, 2]],
-        (True, True, True): [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]],
-    }
-    result = {}
-    for case, triangles in first.items():
-        for turn in range(3):
-            # Turning the corners by one turns the edges by one, too.
-            turned = (case[-turn % 3], case[(1 - turn) % 3], case[(2 - turn) % 3])
-            result[turned] = [[(k % 3 + turn) % 3 + 3 * (k >= 3) for k in triangle] for triangle in triangles]
-    return result
-
-
-_PATTERNS = _patterns()

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from o3d_relief.scene.arrays import MeshArrays
-from o3d_relief.solid.refine import _PATTERNS, refined_for_texture
+from o3d_relief.solid.refine import refined_for_texture
 from o3d_relief.solid.texture_ranges import Ranges
 from shapes import bust, exploded, grid
 
@@ -62,19 +62,6 @@ def test_faces_with_vertices_of_their_own_still_meet():
     fine = refined_for_texture(textured(*exploded(bust(12))), 3.0)
     welded = trimesh.Trimesh(fine.vertices, fine.faces, process=True)
     assert welded.is_watertight
-
-
-def test_every_case_covers_the_face_once():
-    places = np.array([[0, 0], [2, 0], [0, 2], [1, 0], [1, 1], [0, 1]], dtype=float)
-    assert len(_PATTERNS) == 8
-    for case, triangles in _PATTERNS.items():
-        a, b, c = places[np.array(triangles)].transpose(1, 0, 2)
-        area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-        assert (area > 0).all()
-        assert area.sum() == 4.0
-        assert {k for triangle in triangles for k in triangle} == {0, 1, 2} | {
-            3 + k for k, halved in enumerate(case) if halved
-        }
 
 
 def test_refinement_ends():
