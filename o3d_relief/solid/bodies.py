@@ -38,13 +38,9 @@ def joined(whole: manifold3d.Manifold, params: PlateParams) -> tuple[manifold3d.
     """
     import manifold3d
 
-    mesh = whole.to_mesh64()
-    properties, corners = np.asarray(mesh.vert_properties), np.asarray(mesh.tri_verts).astype(np.int64)
-    target = np.arange(len(properties))
-    target[np.asarray(mesh.merge_from_vert, dtype=np.int64)] = np.asarray(mesh.merge_to_vert, dtype=np.int64)
-    label = bodies(target[corners])
+    properties, corners, target, label = _labelled(whole)
     volumes, rear = _measured(properties[:, :3], corners, label)
-    crumb = (volumes > 0.0) & (volumes < params.nozzle_mm**3) & (volumes < volumes.max())
+    crumb = _crumbs(volumes, params)
     solid = (volumes > 0.0) & ~crumb
     counts = {"voids_filled": float((volumes <= 0.0).sum()), "crumbs": float(crumb.sum())}
     # The plate is the rearmost; without one, the largest body is the main one.
@@ -76,7 +72,34 @@ def joined(whole: manifold3d.Manifold, params: PlateParams) -> tuple[manifold3d.
             else {name: counts[name] for name in ("voids_filled", "crumbs")}
         )
         return result, {name: value + told.get(name, 0.0) for name, value in more.items()}
-    return manifold3d.Manifold.batch_boolean(made, manifold3d.OpType.Add), counts
+    union, made_new = _swept(manifold3d.Manifold.batch_boolean(made, manifold3d.OpType.Add), params)
+    return union, counts | {"crumbs": counts["crumbs"] + made_new}
+
+
+def _labelled(
+    whole: manifold3d.Manifold,
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Return vertices with properties, faces, what each vertex is merged into, and the body of each face."""
+    mesh = whole.to_mesh64()
+    properties, corners = np.asarray(mesh.vert_properties), np.asarray(mesh.tri_verts).astype(np.int64)
+    target = np.arange(len(properties))
+    target[np.asarray(mesh.merge_from_vert, dtype=np.int64)] = np.asarray(mesh.merge_to_vert, dtype=np.int64)
+    return properties, corners, target, bodies(target[corners])
+
+
+def _crumbs(volumes: NDArray[np.float64], params: PlateParams) -> NDArray[np.bool_]:
+    """Tell which bodies are smaller than a drop from the nozzle."""
+    return np.asarray((volumes > 0.0) & (volumes < params.nozzle_mm**3) & (volumes < volumes.max()))
+
+
+def _swept(whole: manifold3d.Manifold, params: PlateParams) -> tuple[manifold3d.Manifold, float]:
+    """Leave out the crumbs that a union has made; return their number, too."""
+    properties, corners, target, label = _labelled(whole)
+    volumes, _ = _measured(properties[:, :3], corners, label)
+    crumb = _crumbs(volumes, params)
+    if not crumb.any():
+        return whole, 0.0
+    return _only(properties, corners, target, ~crumb[label]), float(crumb.sum())
 
 
 def _measured(
