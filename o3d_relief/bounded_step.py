@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o3d_relief.bounds.bounded import closest_relief, lowest_seen
+from o3d_relief.bounds.extremes import extreme_pairs
 from o3d_relief.bounds.pairs import Pairs, grid_pairs, vertex_pairs
 from o3d_relief.bounds.parts import tie_parts
 from o3d_relief.bounds.seen import face_weights, point_rows, seen_faces, seen_points
@@ -63,7 +64,7 @@ def bounded_step(
         faces,
         form if ties is None else form + ties.among_held,
         depth,
-        Pairs.join([stacked, grid_pairs(vertices, faces)]),
+        Pairs.join([stacked, extreme_pairs(grid_pairs(vertices, faces), vertices[:, :2])]),
         seen,
         visible,
         pull=np.zeros(n) if ties is None else ties.among_held_pull,

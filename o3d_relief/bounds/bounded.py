@@ -134,17 +134,13 @@ def closest_relief(
     between = BetweenLines(vertices, faces)
     added = [0]
 
-    def missed(
-        x: NDArray[np.float64], accepted: NDArray[np.float64]
-    ) -> tuple[sp.csr_array, NDArray[np.float64]]:
+    def missed(x: NDArray[np.float64]) -> tuple[sp.csr_array, NDArray[np.float64]]:
         wrong = between.missed_pairs(place(x))
-        there = np.subtract(*wrong.heights(accepted))
-        least = np.minimum(_KEPT_GAP * ratio * wrong.gap, there / 2.0)
         # What touches has no order; it may turn about the point of contact a little.
-        least = np.where(wrong.gap > _TOUCH, least, -_TOUCH / 4.0)
-        usable = there > least + _TOUCH / 1000.0
-        added[0] += int(usable.sum())
-        return gap_rows(wrong.select(usable), n), least[usable]
+        least = np.where(wrong.gap > _TOUCH, _KEPT_GAP * ratio * wrong.gap, -_TOUCH / 4.0)
+        rows = gap_rows(wrong, n)
+        added[0] += len(wrong)
+        return rows, np.minimum(least, rows @ inside - _TOUCH / 1000.0)
 
     found = minimise(
         hessian,

@@ -5,13 +5,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from o3d_relief.bounds.crossings import crossings, edges_of
+from o3d_relief.bounds.crossings import Crossings, crossings, edges_of
 from o3d_relief.bounds.pairs import Pairs, foot_pairs, vertex_pairs
 
 __all__ = ["BetweenLines"]
 
 _SAME = 1e-3
 """Relief units below which float32 rays do not tell two surfaces apart."""
+
+_SHALLOW = 1e-4
+"""Depth in relief units from which crossings of surfaces that were apart count."""
+
+_MANY = 200
+"""Where so many pairs cross, nothing else is looked for: most of it goes away with them."""
 
 
 class BetweenLines:
@@ -45,20 +51,37 @@ class BetweenLines:
         relief = np.column_stack([self._vertices[:, :2], z])
         met = crossings(relief, self._faces, self._edges)
         new = met.pierced(z) & ~met.pierced(before)
-        new &= (z[met.face].max(axis=1) > 0.0) & (z[met.edge].max(axis=1) > 0.0)
-        found = met.select(new).pairs(before, z)
-        found = found.select(np.maximum(*found.heights(z)) > 0.0)
-        if len(found) == 0:
-            stacked = vertex_pairs(relief, self._faces)
-            gap = np.subtract(*stacked.heights(before))
-            inverted = stacked.select(gap < -_SAME)
-            turned = Pairs(
-                upper=inverted.lower,
-                upper_weights=inverted.lower_weights,
-                lower=inverted.upper,
-                lower_weights=inverted.upper_weights,
-                gap=-gap[gap < -_SAME],
-            )
-            found = Pairs.join([turned, foot_pairs(self._vertices, self._faces, self._edges, z)])
-            found = found.select(np.maximum(*found.heights(z)) > 0.0)
-        return found
+        # What is deepest between the edges of two triangles is less deep at them: of surfaces that were
+        # apart, shallow crossings count, too.
+        apart = np.abs(met.gaps(before)).min(axis=1) > 2.0 * _SAME
+        new |= apart & met.pierced(z, deep=_SHALLOW) & ~met.pierced(before, deep=_SHALLOW / 2.0)
+        new &= _in_front(met, before, z)
+        crossing = met.select(new).pairs(before, z)
+        if len(crossing) > _MANY:
+            return crossing
+        stacked = vertex_pairs(relief, self._faces)
+        gap = np.subtract(*stacked.heights(before))
+        inverted = stacked.select(gap < -_SAME)
+        turned = Pairs(
+            upper=inverted.lower,
+            upper_weights=inverted.lower_weights,
+            lower=inverted.upper,
+            lower_weights=inverted.upper_weights,
+            gap=-gap[gap < -_SAME],
+        )
+        found = Pairs.join([turned, foot_pairs(self._vertices, self._faces, self._edges, z)])
+        return Pairs.join([crossing, found.select(np.maximum(*found.heights(z)) > 0.0)])
+
+
+def _in_front(met: Crossings, before: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Tell which crossings lie in front of S, or have something in front of it out of order, (c,)."""
+    first, last = met.gaps(z).T
+    change = first - last
+    share = np.clip(first / np.where(change == 0.0, 1.0, change), 0.0, 1.0)
+    start, end = z[met.edge].T[:, :, None]
+    at_ends = start + met.along * (end - start)
+    crossing = at_ends[:, 0] + share * (at_ends[:, 1] - at_ends[:, 0])
+    pairs = met.pairs(before, z)
+    upper, lower = pairs.heights(z)
+    wrong = (upper < lower) & (np.maximum(upper, lower) > 0.0)
+    return np.asarray((crossing > 0.0) | wrong.reshape(-1, 2).any(axis=1))
