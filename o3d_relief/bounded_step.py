@@ -12,6 +12,7 @@ from o3d_relief.bounds.extremes import extreme_pairs
 from o3d_relief.bounds.pairs import Pairs, grid_pairs, vertex_pairs
 from o3d_relief.bounds.parts import tie_parts
 from o3d_relief.bounds.seen import face_weights, point_rows, seen_faces, seen_points
+from o3d_relief.bounds.silhouettes import silhouette_pairs
 from o3d_relief.errors import ParameterError
 from o3d_relief.linalg.laplacian import cotangent_laplacian
 from o3d_relief.params import ReliefParams
@@ -56,6 +57,7 @@ def bounded_step(
 
     form, slivers = cotangent_laplacian(vertices, faces, weights=weight)
     stacked = vertex_pairs(vertices, faces)
+    crossed = silhouette_pairs(vertices, faces)
     ties = tie_parts(
         vertices, faces, form, np.arange(n), stacked, stacked.gap * (depth / deep), across_gaps=_EMPTY
     )
@@ -64,7 +66,7 @@ def bounded_step(
         faces,
         form if ties is None else form + ties.among_held,
         depth,
-        Pairs.join([stacked, extreme_pairs(grid_pairs(vertices, faces), vertices[:, :2])]),
+        Pairs.join([stacked, crossed, extreme_pairs(grid_pairs(vertices, faces), vertices[:, :2])]),
         seen,
         visible,
         pull=np.zeros(n) if ties is None else ties.among_held_pull,
