@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from o3d_relief.bounds.crossings import Crossings, crossings, edges_of
+from o3d_relief.bounds.origin import Origin
 from o3d_relief.bounds.pairs import Pairs, foot_pairs, vertex_pairs
+from o3d_relief.bounds.rows import gap_rows
+from o3d_relief.stages.trim import trim_behind
 
 __all__ = ["BetweenLines"]
 
@@ -34,8 +38,8 @@ class BetweenLines:
         self._vertices, self._faces = vertices, faces
         self._edges = edges_of(faces)
 
-    def missed_pairs(self, z: NDArray[np.float64]) -> Pairs:
-        """Find what crosses where nothing crossed before, or else what has changed places.
+    def missed(self, z: NDArray[np.float64]) -> tuple[sp.csr_array, NDArray[np.float64]]:
+        """Find what crosses or has changed places where it did not before.
 
         Parameters
         ----------
@@ -44,9 +48,18 @@ class BetweenLines:
 
         Returns
         -------
-        Pairs
-            In the order of the original. What lies behind S does not count.
+        rows : (p, n) sparse float64
+            Rows R, with which R z is the gap of two places that have come out of order, or are next to some
+            that have.
+        gap : (p,) float64
+            That of before. What lies behind S does not count.
         """
+        found = self._before_the_cut(z)
+        if len(found):
+            return gap_rows(found, len(z)), found.gap
+        return self._after_the_cut(z)
+
+    def _before_the_cut(self, z: NDArray[np.float64]) -> Pairs:
         before = self._vertices[:, 2]
         relief = np.column_stack([self._vertices[:, :2], z])
         met = crossings(relief, self._faces, self._edges)
@@ -71,6 +84,23 @@ class BetweenLines:
         )
         found = Pairs.join([turned, foot_pairs(self._vertices, self._faces, self._edges, z)])
         return Pairs.join([crossing, found.select(np.maximum(*found.heights(z)) > 0.0)])
+
+    def _after_the_cut(self, z: NDArray[np.float64]) -> tuple[sp.csr_array, NDArray[np.float64]]:
+        """Look at the edges that the cut makes: they cross surfaces between the edges of their triangles."""
+        n = len(z)
+        places = np.column_stack([self._vertices[:, :2], z])
+        cut = trim_behind(places, self._faces, np.ones(n, dtype=bool))
+        first, second = cut.vertex_from.T
+        number = np.arange(len(first))
+        weights = np.concatenate([1.0 - cut.vertex_share, cut.vertex_share])
+        entries = np.concatenate([number, number]), np.concatenate([first, second])
+        carry = sp.coo_array((weights, entries), shape=(len(first), n)).tocsr()
+        before, after = carry @ self._vertices[:, 2], cut.vertices[:, 2]
+        met = crossings(cut.vertices, cut.faces, edges_of(cut.faces))
+        met = met.select(met.pierced(after) & ~met.pierced(before))
+        known = Origin(cut.faces, cut.parents, self._vertices).crossed(met.edge[:, [0, 1, 1]], met.face)
+        found = met.select(~known).pairs(before, after)
+        return (gap_rows(found, len(first)) @ carry).tocsr(), found.gap
 
 
 def _in_front(met: Crossings, before: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -37,7 +37,7 @@ it is not far to where rows that come later hold, too."""
 _MOST_BENT = 5.0
 """Corrections for the bend of the central path are cut off at so many times the barrier."""
 
-_ROUNDS = 60
+_ROUNDS = 80
 
 Vector = NDArray[np.float64]
 Kinds = list[Vector]
