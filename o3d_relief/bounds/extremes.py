@@ -61,7 +61,7 @@ def extreme_pairs(pairs: Pairs, plane: NDArray[np.float64], *, side: int = 1024)
 
 
 def _groups(pairs: Pairs, n: int) -> NDArray[np.int64]:
-    """Number the combinations of an upper and a lower triangle, (p,)."""
+    """Give numbers to the combinations of an upper and a lower triangle, (p,)."""
     upper, lower = (
         np.unique(corners @ np.array([n * n, n, 1]), return_inverse=True)[1]
         for corners in (pairs.upper, pairs.lower)

@@ -90,6 +90,8 @@ class BetweenLines:
         n = len(z)
         places = np.column_stack([self._vertices[:, :2], z])
         cut = trim_behind(places, self._faces, np.ones(n, dtype=bool))
+        if len(cut.faces) == 0:
+            return sp.csr_array((0, n)), np.zeros(0)
         first, second = cut.vertex_from.T
         number = np.arange(len(first))
         weights = np.concatenate([1.0 - cut.vertex_share, cut.vertex_share])

@@ -28,8 +28,8 @@ class RoughSolver:
     """Prepares matrices of one kind.
 
     Few unknowns are solved for by a sparse factor, many by conjugate gradients with a V-cycle of multigrid
-    to a residual of 1e-2, in time and memory that grow linearly. Where that takes too many steps, and stiff springs tie
-    what the mesh does not, this and all later matrices are factorised.
+    to a residual of 1e-2, in time and memory that grow linearly. Where that takes too many steps, since stiff
+    springs tie what the mesh does not, this and all later matrices are factorised.
 
     Parameters
     ----------
