@@ -25,6 +25,9 @@ __all__ = ["bounded_step"]
 _SHALLOWEST = 1e-3
 """Smallest depth in relief units: what is closer together nothing here tells apart."""
 
+_CONTACT = 1e-3
+"""Gap in relief units up to which surfaces touch: they have no order."""
+
 _EMPTY = 1e-3
 """Stiffness of the springs across gaps in bounded mode: empty space gives depth away for nothing, the springs
 only settle what nothing else does."""
@@ -57,7 +60,6 @@ def bounded_step(
 
     form, slivers = cotangent_laplacian(vertices, faces, weights=weight)
     stacked = vertex_pairs(vertices, faces)
-    crossed = silhouette_pairs(vertices, faces)
     ties = tie_parts(
         vertices, faces, form, np.arange(n), stacked, stacked.gap * (depth / deep), across_gaps=_EMPTY
     )
@@ -66,7 +68,7 @@ def bounded_step(
         faces,
         form if ties is None else form + ties.among_held,
         depth,
-        Pairs.join([stacked, crossed, extreme_pairs(grid_pairs(vertices, faces), vertices[:, :2])]),
+        _stacked(vertices, faces, stacked, params),
         seen,
         visible,
         pull=np.zeros(n) if ties is None else ties.among_held_pull,
@@ -88,6 +90,17 @@ def bounded_step(
     return BoundedStage(
         face_weight=weight, attached=attached, energy_gap=found.gap, z=on_plane(found.z), counts=counts
     )
+
+
+def _stacked(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], stacked: Pairs, params: ReliefParams
+) -> Pairs:
+    """Add to the pairs of vertices those where silhouettes cross, and on a grid what these do not imply."""
+    grid = grid_pairs(vertices, faces)
+    grid = grid.select(grid.gap > _CONTACT)
+    if params.min_gap == 0.0:  # what is asked of the others is not linear between two triangles
+        grid = extreme_pairs(grid, vertices[:, :2])
+    return Pairs.join([stacked, silhouette_pairs(vertices, faces), grid])
 
 
 def _wanted_depth(scene: SceneStage, params: ReliefParams) -> float:

@@ -88,9 +88,9 @@ def closest_relief(
                 z' <= depth       for every vertex
                 gap' > 0          for every pair of stacked surfaces.
 
-    Linear scaling fulfils every constraint with room to spare: the search starts there and never leaves
-    the inside. In the end the relief is moved and stretched a little so that it reaches from S to the
-    depth exactly, which keeps all constraints.
+    Linear scaling fulfils every constraint with room to spare: the search starts there. In the end the
+    relief is moved and stretched a little so that it reaches from S to the depth exactly, which keeps all
+    constraints.
 
     Parameters
     ----------
