@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from o3d_relief.bounds.crossings import Crossings, crossings, edges_of
 from o3d_relief.bounds.origin import Origin
-from o3d_relief.bounds.pairs import Pairs, foot_pairs, vertex_pairs
+from o3d_relief.bounds.pairs import Pairs, foot_pairs, grid_pairs, upright, vertex_pairs
 from o3d_relief.bounds.rows import gap_rows
 from o3d_relief.stages.trim import trim_behind
 
@@ -72,21 +72,16 @@ class BetweenLines:
         crossing = met.select(new).pairs(before, z)
         if len(crossing) > _MANY:
             return crossing
-        stacked = vertex_pairs(relief, self._faces)
-        gap = np.subtract(*stacked.heights(before))
-        inverted = stacked.select(gap < -_SAME)
-        turned = Pairs(
-            upper=inverted.lower,
-            upper_weights=inverted.lower_weights,
-            lower=inverted.upper,
-            lower_weights=inverted.upper_weights,
-            gap=-gap[gap < -_SAME],
-        )
+        turned = _turned(vertex_pairs(relief, self._faces), before)
         found = Pairs.join([turned, foot_pairs(self._vertices, self._faces, self._edges, z)])
         return Pairs.join([crossing, found.select(np.maximum(*found.heights(z)) > 0.0)])
 
     def _after_the_cut(self, z: NDArray[np.float64]) -> tuple[sp.csr_array, NDArray[np.float64]]:
-        """Look at the edges that the cut makes: they cross surfaces between the edges of their triangles."""
+        """Test the relief with its cut, as the certificate does.
+
+        The edges that the cut makes cross surfaces between the edges of their triangles, and what stood
+        upright in the scene, which is left out here, hides other surfaces.
+        """
         n = len(z)
         places = np.column_stack([self._vertices[:, :2], z])
         cut = trim_behind(places, self._faces, np.ones(n, dtype=bool))
@@ -100,9 +95,28 @@ class BetweenLines:
         before, after = carry @ self._vertices[:, 2], cut.vertices[:, 2]
         met = crossings(cut.vertices, cut.faces, edges_of(cut.faces))
         met = met.select(met.pierced(after) & ~met.pierced(before))
-        known = Origin(cut.faces, cut.parents, self._vertices).crossed(met.edge[:, [0, 1, 1]], met.face)
-        found = met.select(~known).pairs(before, after)
+        origin = Origin(cut.faces, cut.parents, self._vertices)
+        known = origin.crossed(met.edge[:, [0, 1, 1]], met.face)
+        lying = cut.faces[~upright(np.column_stack([cut.vertices[:, :2], before]), cut.faces)]
+        low, high = self._vertices.min(axis=0), self._vertices.max(axis=0)
+        stacked = vertex_pairs(cut.vertices, lying), grid_pairs(cut.vertices, lying, low=low, high=high)
+        turned = _turned(Pairs.join(list(stacked)), before)
+        turned = turned.select(~origin.crossed(turned.upper, turned.lower))
+        found = Pairs.join([met.select(~known).pairs(before, after), turned])
         return (gap_rows(found, len(first)) @ carry).tocsr(), found.gap
+
+
+def _turned(stacked: Pairs, before: NDArray[np.float64]) -> Pairs:
+    """Return the pairs of a relief that stood the other way round before, in the order of before."""
+    gap = np.subtract(*stacked.heights(before))
+    inverted = stacked.select(gap < -_SAME)
+    return Pairs(
+        upper=inverted.lower,
+        upper_weights=inverted.lower_weights,
+        lower=inverted.upper,
+        lower_weights=inverted.upper_weights,
+        gap=-gap[gap < -_SAME],
+    )
 
 
 def _in_front(met: Crossings, before: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.bool_]:
