@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o3d_relief.bounds.bounded import closest_relief, lowest_seen
+from o3d_relief.bounds.extremes import extreme_pairs
 from o3d_relief.bounds.pairs import Pairs, grid_pairs, vertex_pairs
 from o3d_relief.bounds.parts import tie_parts
 from o3d_relief.bounds.seen import face_weights, point_rows, seen_faces, seen_points
+from o3d_relief.bounds.silhouettes import silhouette_pairs
 from o3d_relief.errors import ParameterError
 from o3d_relief.linalg.laplacian import cotangent_laplacian
 from o3d_relief.params import ReliefParams
@@ -22,6 +24,9 @@ __all__ = ["bounded_step"]
 
 _SHALLOWEST = 1e-3
 """Smallest depth in relief units: what is closer together nothing here tells apart."""
+
+_CONTACT = 1e-3
+"""Gap in relief units up to which surfaces touch: they have no order."""
 
 _EMPTY = 1e-3
 """Stiffness of the springs across gaps in bounded mode: empty space gives depth away for nothing, the springs
@@ -63,7 +68,7 @@ def bounded_step(
         faces,
         form if ties is None else form + ties.among_held,
         depth,
-        Pairs.join([stacked, grid_pairs(vertices, faces)]),
+        _stacked(vertices, faces, stacked, params),
         seen,
         visible,
         pull=np.zeros(n) if ties is None else ties.among_held_pull,
@@ -85,6 +90,17 @@ def bounded_step(
     return BoundedStage(
         face_weight=weight, attached=attached, energy_gap=found.gap, z=on_plane(found.z), counts=counts
     )
+
+
+def _stacked(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], stacked: Pairs, params: ReliefParams
+) -> Pairs:
+    """Add to the pairs of vertices those where silhouettes cross, and on a grid what these do not imply."""
+    grid = grid_pairs(vertices, faces)
+    grid = grid.select(grid.gap > _CONTACT)
+    if params.min_gap == 0.0:  # what is asked of the others is not linear between two triangles
+        grid = extreme_pairs(grid, vertices[:, :2])
+    return Pairs.join([stacked, silhouette_pairs(vertices, faces), grid])
 
 
 def _wanted_depth(scene: SceneStage, params: ReliefParams) -> float:

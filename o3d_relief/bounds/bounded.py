@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from o3d_relief.bounds.missed import BetweenLines
 from o3d_relief.bounds.order import out_of_order
 from o3d_relief.bounds.pairs import Pairs
+from o3d_relief.bounds.rows import gap_rows
 from o3d_relief.linalg.interior import minimise
 from o3d_relief.progress import Tick, silent
 
@@ -87,9 +88,9 @@ def closest_relief(
                 z' <= depth       for every vertex
                 gap' > 0          for every pair of stacked surfaces.
 
-    Linear scaling fulfils every constraint with room to spare: the search starts there and never leaves
-    the inside. In the end the relief is moved and stretched a little so that it reaches from S to the
-    depth exactly, which keeps all constraints.
+    Linear scaling fulfils every constraint with room to spare: the search starts there. In the end the
+    relief is moved and stretched a little so that it reaches from S to the depth exactly, which keeps all
+    constraints.
 
     Parameters
     ----------
@@ -134,17 +135,12 @@ def closest_relief(
     between = BetweenLines(vertices, faces)
     added = [0]
 
-    def missed(
-        x: NDArray[np.float64], accepted: NDArray[np.float64]
-    ) -> tuple[sp.csr_array, NDArray[np.float64]]:
-        wrong = between.missed_pairs(place(x))
-        there = np.subtract(*wrong.heights(accepted))
-        least = np.minimum(_KEPT_GAP * ratio * wrong.gap, there / 2.0)
+    def missed(x: NDArray[np.float64]) -> tuple[sp.csr_array, NDArray[np.float64]]:
+        wrong, gap = between.missed(place(x))
         # What touches has no order; it may turn about the point of contact a little.
-        least = np.where(wrong.gap > _TOUCH, least, -_TOUCH / 4.0)
-        usable = there > least + _TOUCH / 1000.0
-        added[0] += int(usable.sum())
-        return gap_rows(wrong.select(usable), n), least[usable]
+        least = np.where(gap > _TOUCH, _KEPT_GAP * ratio * gap, -_TOUCH / 4.0)
+        added[0] += len(gap)
+        return wrong, np.minimum(least, wrong @ inside - _TOUCH / 1000.0)
 
     found = minimise(
         hessian,
@@ -208,24 +204,6 @@ def lowest_seen(z: NDArray[np.float64], seen: sp.csr_array, visible: NDArray[np.
     float
     """
     return min(float(z[visible].min(initial=np.inf)), float((seen @ z).min(initial=np.inf)))
-
-
-def gap_rows(pairs: Pairs, n: int) -> sp.csr_array:
-    """Return the matrix R, (p, n), with which R z is the height of the upper less that of the lower.
-
-    Like `Pairs.difference`, but without sorting the entries: there may be a million pairs.
-    """
-    columns = np.concatenate([pairs.upper, pairs.lower], axis=1)
-    values = np.concatenate([pairs.upper_weights, -pairs.lower_weights], axis=1)
-    return _rows(columns, values, n)
-
-
-def _rows(columns: NDArray[np.int64], values: NDArray[np.float64], n: int) -> sp.csr_array:
-    count, width = columns.shape
-    starts = np.arange(count + 1, dtype=np.int64) * width
-    kind = np.int32 if max(count * width, n) < 2**31 else np.int64
-    parts = values.ravel(), columns.ravel().astype(kind), starts.astype(kind)
-    return sp.csr_array(parts, shape=(count, n))
 
 
 def _onto_plane(

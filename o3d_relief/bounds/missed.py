@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from o3d_relief.bounds.crossings import crossings, edges_of
-from o3d_relief.bounds.pairs import Pairs, foot_pairs, vertex_pairs
+from o3d_relief.bounds.crossings import Crossings, crossings, edges_of
+from o3d_relief.bounds.origin import Origin
+from o3d_relief.bounds.pairs import Pairs, foot_pairs, grid_pairs, upright, vertex_pairs
+from o3d_relief.bounds.rows import gap_rows
+from o3d_relief.stages.trim import trim_behind
 
 __all__ = ["BetweenLines"]
 
 _SAME = 1e-3
 """Relief units below which float32 rays do not tell two surfaces apart."""
+
+_SHALLOW = 1e-4
+"""Depth in relief units from which crossings of surfaces that were apart count."""
+
+_MANY = 200
+"""Where so many pairs cross, nothing else is looked for: most of it goes away with them."""
 
 
 class BetweenLines:
@@ -28,8 +38,8 @@ class BetweenLines:
         self._vertices, self._faces = vertices, faces
         self._edges = edges_of(faces)
 
-    def missed_pairs(self, z: NDArray[np.float64]) -> Pairs:
-        """Find what crosses where nothing crossed before, or else what has changed places.
+    def missed(self, z: NDArray[np.float64]) -> tuple[sp.csr_array, NDArray[np.float64]]:
+        """Find what crosses or has changed places where it did not before.
 
         Parameters
         ----------
@@ -38,27 +48,86 @@ class BetweenLines:
 
         Returns
         -------
-        Pairs
-            In the order of the original. What lies behind S does not count.
+        rows : (p, n) sparse float64
+            Rows R, with which R z is the gap of two places that have come out of order, or are next to some
+            that have.
+        gap : (p,) float64
+            That of before. What lies behind S does not count.
         """
+        found = self._before_the_cut(z)
+        if len(found):
+            return gap_rows(found, len(z)), found.gap
+        return self._after_the_cut(z)
+
+    def _before_the_cut(self, z: NDArray[np.float64]) -> Pairs:
         before = self._vertices[:, 2]
         relief = np.column_stack([self._vertices[:, :2], z])
         met = crossings(relief, self._faces, self._edges)
         new = met.pierced(z) & ~met.pierced(before)
-        new &= (z[met.face].max(axis=1) > 0.0) & (z[met.edge].max(axis=1) > 0.0)
-        found = met.select(new).pairs(before, z)
-        found = found.select(np.maximum(*found.heights(z)) > 0.0)
-        if len(found) == 0:
-            stacked = vertex_pairs(relief, self._faces)
-            gap = np.subtract(*stacked.heights(before))
-            inverted = stacked.select(gap < -_SAME)
-            turned = Pairs(
-                upper=inverted.lower,
-                upper_weights=inverted.lower_weights,
-                lower=inverted.upper,
-                lower_weights=inverted.upper_weights,
-                gap=-gap[gap < -_SAME],
-            )
-            found = Pairs.join([turned, foot_pairs(self._vertices, self._faces, self._edges, z)])
-            found = found.select(np.maximum(*found.heights(z)) > 0.0)
-        return found
+        # What is deepest between the edges of two triangles is less deep at them: of surfaces that were
+        # apart, shallow crossings count, too.
+        apart = np.abs(met.gaps(before)).min(axis=1) > 2.0 * _SAME
+        new |= apart & met.pierced(z, deep=_SHALLOW) & ~met.pierced(before, deep=_SHALLOW / 2.0)
+        new &= _in_front(met, before, z)
+        crossing = met.select(new).pairs(before, z)
+        if len(crossing) > _MANY:
+            return crossing
+        turned = _turned(vertex_pairs(relief, self._faces), before)
+        found = Pairs.join([turned, foot_pairs(self._vertices, self._faces, self._edges, z)])
+        return Pairs.join([crossing, found.select(np.maximum(*found.heights(z)) > 0.0)])
+
+    def _after_the_cut(self, z: NDArray[np.float64]) -> tuple[sp.csr_array, NDArray[np.float64]]:
+        """Test the relief with its cut, as the certificate does.
+
+        The edges that the cut makes cross surfaces between the edges of their triangles, and what stood
+        upright in the scene, which is left out here, hides other surfaces.
+        """
+        n = len(z)
+        places = np.column_stack([self._vertices[:, :2], z])
+        cut = trim_behind(places, self._faces, np.ones(n, dtype=bool))
+        if len(cut.faces) == 0:
+            return sp.csr_array((0, n)), np.zeros(0)
+        first, second = cut.vertex_from.T
+        number = np.arange(len(first))
+        weights = np.concatenate([1.0 - cut.vertex_share, cut.vertex_share])
+        entries = np.concatenate([number, number]), np.concatenate([first, second])
+        carry = sp.coo_array((weights, entries), shape=(len(first), n)).tocsr()
+        before, after = carry @ self._vertices[:, 2], cut.vertices[:, 2]
+        met = crossings(cut.vertices, cut.faces, edges_of(cut.faces))
+        met = met.select(met.pierced(after) & ~met.pierced(before))
+        origin = Origin(cut.faces, cut.parents, self._vertices)
+        known = origin.crossed(met.edge[:, [0, 1, 1]], met.face)
+        lying = cut.faces[~upright(np.column_stack([cut.vertices[:, :2], before]), cut.faces)]
+        low, high = self._vertices.min(axis=0), self._vertices.max(axis=0)
+        stacked = vertex_pairs(cut.vertices, lying), grid_pairs(cut.vertices, lying, low=low, high=high)
+        turned = _turned(Pairs.join(list(stacked)), before)
+        turned = turned.select(~origin.crossed(turned.upper, turned.lower))
+        found = Pairs.join([met.select(~known).pairs(before, after), turned])
+        return (gap_rows(found, len(first)) @ carry).tocsr(), found.gap
+
+
+def _turned(stacked: Pairs, before: NDArray[np.float64]) -> Pairs:
+    """Return the pairs of a relief that stood the other way round before, in the order of before."""
+    gap = np.subtract(*stacked.heights(before))
+    inverted = stacked.select(gap < -_SAME)
+    return Pairs(
+        upper=inverted.lower,
+        upper_weights=inverted.lower_weights,
+        lower=inverted.upper,
+        lower_weights=inverted.upper_weights,
+        gap=-gap[gap < -_SAME],
+    )
+
+
+def _in_front(met: Crossings, before: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Tell which crossings lie in front of S, or have something in front of it out of order, (c,)."""
+    first, last = met.gaps(z).T
+    change = first - last
+    share = np.clip(first / np.where(change == 0.0, 1.0, change), 0.0, 1.0)
+    start, end = z[met.edge].T[:, :, None]
+    at_ends = start + met.along * (end - start)
+    crossing = at_ends[:, 0] + share * (at_ends[:, 1] - at_ends[:, 0])
+    pairs = met.pairs(before, z)
+    upper, lower = pairs.heights(z)
+    wrong = (upper < lower) & (np.maximum(upper, lower) > 0.0)
+    return np.asarray((crossing > 0.0) | wrong.reshape(-1, 2).any(axis=1))

@@ -1,4 +1,4 @@
-"""Quadratic programs with many linear inequalities, by an interior point method on multigrid."""
+"""Quadratic programs with many linear inequalities, by an interior point method."""
 
 from __future__ import annotations
 
@@ -7,37 +7,28 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-import scipy.sparse.linalg as sla
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from o3d_relief.linalg.solve import multigrid, solve_direct
+from o3d_relief.linalg.central_path import CentralPath
 from o3d_relief.progress import Tick, share_of_way, silent
 
 __all__ = ["Minimum", "minimise"]
 
-_TO_THE_WALL = 0.98
-"""Share of the way to the nearest constraint that a step may go."""
-
-_FIRST_BARRIER = 0.3
-"""Complementarity at the start, as a share of (x - o)' H (x - o) / 2."""
-
 _CHECK_EVERY = 3
-"""Rounds after which further rows are asked for."""
+"""Rounds after which further rows are asked for; one less at the end."""
+
+_CENTRAL = 0.6
+"""Gap below which the iteration does not aim, as a share of the accuracy: from well inside of all constraints
+it is not far to where rows that come later hold, too."""
 
 _SOME_ROOM = 0.2
-"""Room that further rows are given, as a share of what they have where they were last fulfilled."""
+"""Room that further rows are given on the way back, as a share of what they have where all is well."""
 
-_WATCHED = 1.6
-"""Rows that a step so many times as long would break take part in the next system."""
-
-_LINEAR_TOLERANCE = 1e-2
-_LINEAR_STEPS = 150
-_DIRECT_UP_TO = 4000
-_ROUNDS = 60
+_ROUNDS = 80
 
 Vector = NDArray[np.float64]
-MoreRows = Callable[[Vector, Vector], tuple[sp.csr_array, Vector]]
+MoreRows = Callable[[Vector], tuple[sp.csr_array, Vector]]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -78,10 +69,10 @@ def minimise(
 ) -> Minimum:
     """Minimise (x - o)' H (x - o) / 2 - pull' x  subject to  lower <= x <= upper  and  R x >= bound.
 
-    A primal-dual interior point method, whose iterates lie strictly inside all constraints. Each round
-    solves one linear system, H plus springs on the constraints, by conjugate gradients with smoothed
-    aggregation multigrid, so that time and memory grow linearly. Of the rows only those that a step has come
-    near take part in the systems; all of them limit the steps.
+    A primal-dual interior point method with Mehrotra's corrections. Each round solves one linear system, H
+    plus springs on the constraints, for two right-hand sides. Of the rows only those that a step has come
+    near take part in the systems; all of them limit the steps. Whether more rows are needed is asked every
+    few rounds, and the iterate may break these for a while: it goes on from where it is.
 
     Parameters
     ----------
@@ -98,9 +89,8 @@ def minimise(
         R.
     bound : (p,) float64
     more_rows : callable
-        Given an x and one that it has accepted, returns further rows and bounds that the first breaks and the
-        second fulfils, none when all is well. Asked now and then, and at the end: what it accepted last is
-        returned. `start` counts as accepted.
+        Given an x, returns further rows and bounds that `start` is strictly inside of, none when all is well.
+        Asked now and then, and at the end: only an x with which all is well is returned, or `start`.
     accuracy : float
         Gap between the objective and its dual, as a share of (x - o)' H (x - o) / 2, at which the iteration
         stops.
@@ -113,178 +103,44 @@ def minimise(
     Minimum
     """
     with threadpool_limits(limits=1):  # sums that do not depend on the number of threads
-        iteration = _Iteration(form, pull, origin, start, lower, upper, rows, bound, tick)
-        return iteration.run(accuracy, more_rows)
+        path = CentralPath(form, pull, origin, start, lower, upper, rows, bound, tick)
+        accepted, least = _run(path, accuracy, more_rows, tick)
+    share = (path.objective(accepted) - least) / max(path.energy(accepted), 1e-300)
+    return Minimum(x=accepted, rounds=path.rounds, watched=int(path.watched.sum()), gap=share)
 
 
-class _Iteration:
-    """Iterate, slacks and multipliers of the three kinds of constraints: lower, upper, rows."""
-
-    def __init__(
-        self,
-        form: sp.csr_array,
-        pull: Vector,
-        origin: Vector,
-        start: Vector,
-        lower: Vector,
-        upper: Vector,
-        rows: sp.csr_array,
-        bound: Vector,
-        tick: Tick,
-    ) -> None:
-        self.tick = tick
-        self.form, self.pull, self.origin = form, pull, origin
-        self.x = start
-        self.at_lower, self.at_upper = np.flatnonzero(np.isfinite(lower)), np.flatnonzero(np.isfinite(upper))
-        self.lower, self.upper = lower[self.at_lower], upper[self.at_upper]
-        self.rows, self.bound = rows, bound
-        self.watched = np.zeros(len(bound), dtype=bool)
-        self.slack = self._slacks()
-        count = len(self.at_lower) + len(self.at_upper)
-        self.barrier = _FIRST_BARRIER * self._energy(start) / max(count, 1)
-        self.force = [self.barrier / slack for slack in self.slack]
-        self.rounds = 0
-
-    def _energy(self, x: Vector) -> float:
-        moved = x - self.origin
-        return float(0.5 * (moved @ (self.form @ moved)))
-
-    def _objective(self, x: Vector) -> float:
-        return self._energy(x) - float(self.pull @ x)
-
-    def _slacks(self) -> list[Vector]:
-        x = self.x
-        return [
-            x[self.at_lower] - self.lower,
-            self.upper - x[self.at_upper],
-            self.rows @ x - self.bound,
-        ]
-
-    def _moves(self, step: Vector) -> list[Vector]:
-        return [step[self.at_lower], -step[self.at_upper], self.rows @ step]
-
-    def run(self, accuracy: float, more_rows: MoreRows) -> Minimum:
-        accepted, next_check = self.x, _CHECK_EVERY
-        first_share = self._gap() / max(self._energy(self.x), 1e-300)
-        while self.rounds < _ROUNDS:
-            longest = self._advance()
-            gap = self._gap()
-            share = gap / max(self._energy(self.x), 1e-300)
-            self.tick(share_of_way(first_share, share, accuracy))
-            close = share <= accuracy
-            if close or self.rounds >= next_check:
-                clean = self._go_back(accepted, *more_rows(self.x, accepted))
-                if not clean and (close or self.rounds > _ROUNDS // 2):
-                    # Back at the rows just found, all may be well already, and almost as good.
-                    enough = (1.0 + 2.0 * accuracy) * self._energy_before
-                    clean = self._go_back(accepted, *more_rows(self.x, accepted))
-                    close = self._energy(self.x) <= enough
-                if clean:
-                    accepted = self.x
-                    if close:
-                        break
-                next_check = self.rounds + _CHECK_EVERY
-            shrink = 0.1 if longest > 0.6 else 0.3 if longest > 0.3 else 0.6
-            count = len(self.at_lower) + len(self.at_upper) + int(self.watched.sum())
-            self.barrier = max(shrink * gap, 0.1 * accuracy * self._energy(self.x)) / count
-        above = self._objective(accepted) - self._objective(self.x) + self._gap()
-        share = above / max(self._energy(accepted), 1e-300)
-        return Minimum(x=accepted, rounds=self.rounds, watched=int(self.watched.sum()), gap=share)
-
-    def _go_back(self, accepted: Vector, rows: sp.csr_array, bound: Vector) -> bool:
-        """Add rows, and go back towards what was accepted until there is some room to them; tell if none."""
-        if len(bound) == 0:
-            return True
-        self._energy_before = self._energy(self.x)
-        here, there = rows @ self.x - bound, rows @ accepted - bound
-        wanted = _SOME_ROOM * there
-        short = here < wanted
-        share = float(((wanted - here)[short] / (there - here)[short]).max(initial=0.0))
-        self.x = self.x + share * (accepted - self.x)
-        self.rows, self.bound = sp.vstack([self.rows, rows]).tocsr(), np.concatenate([self.bound, bound])
-        self.watched = np.concatenate([self.watched, np.ones(len(bound), dtype=bool)])
-        self.slack = self._slacks()
-        new = self.barrier / self.slack[2][len(self.force[2]) :]
-        self.force[2] = np.concatenate([self.force[2], new])
-        return False
-
-    def _gap(self) -> float:
-        pairs = zip(self._taking_part(self.slack), self._taking_part(self.force), strict=True)
-        return sum(float(slack @ force) for slack, force in pairs)
-
-    def _taking_part(self, values: list[Vector]) -> list[Vector]:
-        return [values[0], values[1], values[2][self.watched]]
-
-    def _advance(self) -> float:
-        """Take one step; return the smaller of its two lengths."""
-        while True:
-            step = self._direction()
-            moves = self._moves(step)
-            reach = _room(self.slack[2], moves[2])
-            first = min(
-                _room(s, m).min(initial=np.inf) for s, m in zip(self.slack[:2], moves[:2], strict=True)
-            )
-            unseen = ~self.watched & (reach < 1.0)
-            length = min(1.0, _TO_THE_WALL * min(first, reach.min(initial=np.inf)))
-            without = min(1.0, _TO_THE_WALL * min(first, reach[~unseen].min(initial=np.inf)))
-            self.watched |= reach < _WATCHED
-            # Rows that were not in the system and cut the step short: solve once more with them.
-            if length > 0.4 or without <= 2.0 * length:
+def _run(path: CentralPath, accuracy: float, more_rows: MoreRows, tick: Tick) -> tuple[Vector, float]:
+    """Follow the path to a place where all is well; return it, and a bound from below on the objective."""
+    accepted, next_check, least = path.x, _CHECK_EVERY, -np.inf
+    first_share = path.gap() / max(path.energy(path.x), 1e-300)
+    while path.rounds < _ROUNDS:
+        path.advance(_CENTRAL * accuracy * path.energy(path.x))
+        share, least = path.gap() / max(path.energy(path.x), 1e-300), path.least()
+        tick(share_of_way(first_share, share, accuracy))
+        close = share <= accuracy
+        # As long as known rows are broken, all is hardly well.
+        if path.rounds >= next_check or (close and not path.lacking.any()):
+            accepted = _check(path, accepted, more_rows)
+            # Rows that have just come can only raise the minimum.
+            if path.objective(accepted) - least <= accuracy * path.energy(accepted):
                 break
-        changes = [
-            (self.barrier - force * move) / slack - force
-            for slack, force, move in zip(self.slack, self.force, moves, strict=True)
-        ]
-        dual = min(
-            float(_room(force, change).min(initial=np.inf))
-            for force, change in zip(self._taking_part(self.force), self._taking_part(changes), strict=True)
-        )
-        dual = min(1.0, _TO_THE_WALL * dual)
-        self.x = self.x + length * step
-        self.slack = self._slacks()
-        self.force = [force + dual * change for force, change in zip(self.force, changes, strict=True)]
-        # What does not take part yet stays on the central path.
-        self.force[2] = np.where(self.watched, self.force[2], self.barrier / self.slack[2])
-        self.force[2] = np.where(self.force[2] > 0.0, self.force[2], self.barrier / self.slack[2])
-        return float(min(length, dual))
-
-    def _direction(self) -> Vector:
-        """Solve the Newton system."""
-        stiffness = [force / slack for force, slack in zip(self.force, self.slack, strict=True)]
-        push = [self.barrier / slack for slack in self.slack]
-        some = np.flatnonzero(self.watched)
-        rows = self.rows[some]
-        diagonal = np.zeros(len(self.x))
-        diagonal[self.at_lower] += stiffness[0]
-        diagonal[self.at_upper] += stiffness[1]
-        system = self.form + sp.diags_array(diagonal)
-        right = self.pull - self.form @ (self.x - self.origin)
-        right[self.at_lower] += push[0]
-        right[self.at_upper] -= push[1]
-        if len(some):
-            system = system + rows.T @ (sp.diags_array(stiffness[2][some]) @ rows)
-            right = right + rows.T @ push[2][some]
-        self.rounds += 1
-        return _solve(system.tocsr(), right, self.tick)
+            next_check = path.rounds + _CHECK_EVERY - close
+    return accepted, least
 
 
-def _room(values: Vector, moves: Vector) -> Vector:
-    """Return the step length at which each value becomes zero."""
-    falling = moves < 0.0
-    return np.where(falling, values / np.where(falling, -moves, 1.0), np.inf)
-
-
-def _solve(matrix: sp.csr_array, right_hand_side: Vector, tick: Tick) -> Vector:
-    """Solve to a low accuracy: the next round mends what is missing, and no constraint depends on it."""
-    if len(right_hand_side) <= _DIRECT_UP_TO:
-        return solve_direct(matrix, right_hand_side)
-    solution, _ = sla.cg(
-        matrix,
-        right_hand_side,
-        rtol=_LINEAR_TOLERANCE,
-        atol=0.0,
-        maxiter=_LINEAR_STEPS,
-        M=multigrid(matrix),
-        callback=lambda _solution: tick(None),
-    )
-    return np.asarray(solution, dtype=np.float64)
+def _check(path: CentralPath, accepted: Vector, more_rows: MoreRows) -> Vector:
+    """Return x where all is well; else add rows, and return the better of two others where it is."""
+    rows, bound = more_rows(path.x)
+    if len(bound) == 0:
+        return path.x
+    here, there = rows @ path.x - bound, rows @ accepted - bound
+    wanted = _SOME_ROOM * there
+    short = here < np.minimum(wanted, there)
+    share = float(((wanted - here)[short] / (there - here)[short]).max(initial=0.0))
+    nearer = path.x + share * (accepted - path.x)
+    path.add(rows, bound)
+    # Where the rounds may not suffice, the way back is worth a look.
+    if path.rounds > _ROUNDS // 2 and share < 1.0 and path.objective(nearer) < path.objective(accepted):
+        further = more_rows(nearer)[1]
+        return nearer if len(further) == 0 else accepted
+    return accepted

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from o3d_relief.bounds.bounded import closest_relief, gap_rows, lowest_seen
+from o3d_relief.bounds.bounded import closest_relief, lowest_seen
 from o3d_relief.bounds.crossings import crossings, edges_of
 from o3d_relief.bounds.pairs import Pairs, grid_pairs, vertex_pairs
 from o3d_relief.bounds.seen import face_weights, point_rows, seen_faces, seen_points
@@ -12,11 +12,6 @@ from shapes import bust, grid, hills
 
 def no_rows(n):
     return point_rows(np.zeros((0, 3), dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros((0, 3)), n)
-
-
-def no_pairs():
-    none, no_weights = np.zeros((0, 3), dtype=np.int64), np.zeros((0, 3))
-    return Pairs(upper=none, upper_weights=no_weights, lower=none, lower_weights=no_weights, gap=np.zeros(0))
 
 
 def closest(shape, depth, *, attach=(), weights=None, min_gap=0.0):
@@ -122,11 +117,3 @@ def test_lowest_seen_counts_points_of_faces():
     rows = point_rows(np.array([[0, 1, 2]]), np.array([0]), np.array([[0.25, 0.5, 0.25]]), 3)
     assert lowest_seen(z, rows, np.array([True, True, False])) == 0.25
     assert lowest_seen(z, no_rows(3), np.array([True, True, False])) == 1.0
-
-
-def test_gap_rows_are_those_of_the_pairs():
-    vertices, faces = bust(16)
-    pairs = vertex_pairs(vertices, faces)
-    z = np.random.default_rng(0).normal(size=len(vertices))
-    assert gap_rows(pairs, len(z)) @ z == pytest.approx(pairs.difference(len(z)) @ z)
-    assert gap_rows(no_pairs(), 4).shape == (0, 4)

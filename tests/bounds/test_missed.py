@@ -7,33 +7,32 @@ from shapes import bust, grid, joined, moved
 
 def test_nothing_is_missed_where_nothing_moves():
     vertices, faces = bust(16)
-    assert len(BetweenLines(vertices, faces).missed_pairs(vertices[:, 2])) == 0
+    assert len(BetweenLines(vertices, faces).missed(vertices[:, 2])[1]) == 0
 
 
 def test_sheets_that_pass_through_each_other_are_found_in_their_old_order():
     low, high = grid(6), moved(grid(4, size=40.0), (3.0, 5.0, 10.0))
     vertices, faces = joined(low, high)
     z = np.where(vertices[:, 2] > 5.0, 20.0 - 0.9 * vertices[:, 0], 15.0)  # tilted through the lower one
-    found = BetweenLines(vertices, faces).missed_pairs(z)
-    assert len(found) > 0
-    assert found.gap == pytest.approx(10.0)
-    assert (found.upper.min(axis=1) >= 36).all()
-    upper, lower = found.heights(z)
-    assert (upper < lower).any()
+    rows, gap = BetweenLines(vertices, faces).missed(z)
+    assert len(gap) > 0
+    assert gap == pytest.approx(10.0)
+    assert rows @ vertices[:, 2] == pytest.approx(gap)
+    assert (rows @ z < 0.0).any()
 
 
 def test_sheets_that_changed_places_as_a_whole_are_found():
     vertices, faces = joined(grid(6), moved(grid(4, size=40.0), (3.0, 5.0, 10.0)))
     z = np.where(vertices[:, 2] > 5.0, 4.0, 9.0)
-    found = BetweenLines(vertices, faces).missed_pairs(z)
-    assert len(found) > 0
-    assert found.gap == pytest.approx(10.0)
+    rows, gap = BetweenLines(vertices, faces).missed(z)
+    assert gap == pytest.approx(10.0)
+    assert rows @ z == pytest.approx(-5.0)
 
 
 def test_what_lies_behind_the_plane_does_not_count():
     vertices, faces = joined(grid(6), moved(grid(4, size=40.0), (3.0, 5.0, 10.0)))
     z = np.where(vertices[:, 2] > 5.0, -4.0, -1.0)
-    assert len(BetweenLines(vertices, faces).missed_pairs(z)) == 0
+    assert len(BetweenLines(vertices, faces).missed(z)[1]) == 0
 
 
 def test_what_crosses_behind_the_plane_hides_nothing_in_front():
@@ -46,6 +45,22 @@ def test_what_crosses_behind_the_plane_hides_nothing_in_front():
         np.where(upper, 4.0, 9.0),
         np.where(upper, -20.0 - 0.1 * (vertices[:, 0] - 203.0), -20.0),
     )
-    found = BetweenLines(vertices, faces).missed_pairs(np.where(right, tilted, swapped))
-    assert len(found) > 0
-    assert (vertices[found.upper, 0] < 100.0).all()
+    rows, gap = BetweenLines(vertices, faces).missed(np.where(right, tilted, swapped))
+    assert len(gap) > 0
+    assert (vertices[rows.indices, 0] < 100.0).all()
+
+
+def test_a_wall_that_rises_through_what_it_touched_is_found_after_the_cut():
+    # A sheet, and an upright wall whose upper edge lies in it: its triangle reaches behind S. Where one end
+    # of that edge comes up, only the edge that the cut makes crosses the sheet.
+    sheet = np.array([[0, 0, 10], [20, 0, 10], [20, 20, 10], [0, 20, 10.0]])
+    wall = np.array([[10, 5, 10], [10, 15, 10], [10, 15, 0.0]])
+    vertices = np.concatenate([sheet, wall])
+    faces = np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6]])
+    z = np.array([2, 2, 2, 2, 2.0, 2.5, -4.0])
+    rows, gap = BetweenLines(vertices, faces).missed(z)
+    assert len(gap) > 0
+    assert rows @ vertices[:, 2] == pytest.approx(gap, abs=1e-9)
+    assert (rows @ z < 0.0).any()
+    z[5] = 2.0
+    assert len(BetweenLines(vertices, faces).missed(z)[1]) == 0

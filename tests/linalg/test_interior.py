@@ -6,8 +6,8 @@ from scipy.optimize import minimize
 from o3d_relief.linalg.interior import minimise
 
 
-def nothing_more(_x, accepted):
-    return sp.csr_array((0, len(accepted))), np.zeros(0)
+def nothing_more(x):
+    return sp.csr_array((0, len(x))), np.zeros(0)
 
 
 def solve(
@@ -78,19 +78,39 @@ def test_random_programs_agree_with_another_solver(seed):
     assert ((found.x > lower) & (found.x < upper)).all()
 
 
-def test_rows_that_come_later_are_kept_and_the_last_accepted_point_is_returned():
+def test_rows_that_come_later_are_kept_and_only_what_was_accepted_is_returned():
     row = sp.csr_array(np.array([[-1.0, 0.0]]))
     asked = []
 
-    def half_way(x, accepted):
-        asked.append(x)
-        assert accepted[0] < 1.0
-        return (row, np.array([-1.0])) if x[0] >= 1.0 else nothing_more(x, accepted)
+    def half_way(x):
+        asked.append(x[0] < 1.0)
+        return nothing_more(x) if x[0] < 1.0 else (row, np.array([-1.0]))
 
     found = solve(np.eye(2), [3, 0], [0.0, 0.5], upper=[2, 2], lower=[-2, -2], more_rows=half_way)
-    assert asked
+    assert not all(asked)
+    assert asked[-1]
     assert found.x[0] < 1.0
     assert found.x == pytest.approx([1.0, 0.0], abs=0.05)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_it_does_not_matter_when_rows_come(seed):
+    rng = np.random.default_rng(seed)
+    n, p = 8, 12
+    half = rng.normal(size=(n, n))
+    form, pull = half @ half.T + 0.1 * np.eye(n), 5 * rng.normal(size=n)
+    rows, start = rng.normal(size=(p, n)), 0.1 * rng.normal(size=n)
+    bound = rows @ start - rng.uniform(0.1, 1.0, p)
+
+    def broken(x):
+        late = np.flatnonzero(rows @ x <= bound)
+        return sp.csr_array(rows[late]), bound[late]
+
+    box = {"lower": np.full(n, -9.0), "upper": np.full(n, 9.0)}
+    known = solve(form, pull, start, rows=rows, bound=bound, **box)
+    late = solve(form, pull, start, more_rows=broken, **box)
+    assert (rows @ late.x > bound).all()
+    assert late.x == pytest.approx(known.x, abs=1e-3)
 
 
 def test_the_gap_is_that_of_what_is_returned():
@@ -101,7 +121,7 @@ def test_the_gap_is_that_of_what_is_returned():
         [0.5, 0.0],
         upper=[2, 2],
         lower=[-2, -2],
-        more_rows=lambda _x, _accepted: (row, np.array([-1.0])),  # nothing is ever accepted
+        more_rows=lambda _x: (row, np.array([-1.0])),  # nothing is ever accepted
     )
     assert found.x == pytest.approx([0.5, 0.0])
     # The objective is -1.375 there, and at least -2.5 where x <= 1; the energy there is 0.125.
