@@ -23,6 +23,9 @@ _SHORTEST, _LONGEST = 1.5, 8.0
 _AROUND, _FURTHEST = 2.0, 32.0
 """What lies further from what is new than this many reaches, four times as many and so on, stays as it is."""
 
+_EXACT = 1e-3
+"""Share by which a correction may be above the least one: a thousandth more does not show."""
+
 _REGION = 3.0
 """What lies further from every correction than this many reaches is not touched, unless it is in the way."""
 
@@ -137,6 +140,7 @@ class Correction:
             -(form @ others),
             columns[own],
             (least - rows @ others)[own],
+            tolerance=_EXACT,
         )
 
     def _concerned(

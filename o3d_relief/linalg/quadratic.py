@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 
 __all__ = ["minimise"]
 
-_TOLERANCE = 1e-3
-"""Share by which the form may lie above its minimum: corrections a thousandth longer do not show."""
-
 _FEASIBLE = 1e-6
+"""Accuracy of the inequalities, at least."""
+
+_REFINED = 1e-4
+"""From here on each step is refined iteratively, which takes as long again."""
+
 _ITERATIONS = 80
 """A programme that can be fulfilled takes 20 to 60; the rest are mostly those that cannot."""
 
@@ -27,6 +29,8 @@ def minimise(
     pull: NDArray[np.float64],
     rows: sp.csr_array,
     least: NDArray[np.float64],
+    *,
+    tolerance: float = 1e-8,
 ) -> NDArray[np.float64] | None:
     """Minimise a quadratic form subject to linear inequalities.
 
@@ -45,6 +49,8 @@ def minimise(
         G.
     least : (m,) float64
         h.
+    tolerance : float
+        Share by which the form may lie above its minimum.
 
     Returns
     -------
@@ -63,9 +69,9 @@ def minimise(
     settings.verbose = False
     settings.max_iter = _ITERATIONS
     settings.direct_solve_method = "qdldl"
-    settings.tol_gap_rel, settings.tol_gap_abs = _TOLERANCE, _FEASIBLE
-    settings.tol_feas = _FEASIBLE
-    settings.iterative_refinement_enable = False  # half of the time, and steps need not be that exact
+    feasible = min(tolerance, _FEASIBLE)
+    settings.tol_gap_rel, settings.tol_gap_abs, settings.tol_feas = tolerance, feasible, feasible
+    settings.iterative_refinement_enable = tolerance < _REFINED
     solver = clarabel.DefaultSolver(
         _columns(sp.triu(form)),
         -pull,
