@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import pickle
+import re
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,15 @@ from o3d_relief.scan.poisson_open3d import Surface, reconstruct
 __all__ = ["main", "reconstruct_apart"]
 
 _PAUSE = 0.1  # seconds between two looks at whether the work is called off
+
+_PROGRAM = (
+    "import sys; sys.path[:] = {path!r}; "
+    "from o3d_relief.scan.poisson_process import main; sys.exit(main({answer!r}))"
+)
+"""The process finds modules where this one does, and nothing of the same name in the working folder."""
+
+_OUT_OF_MEMORY = (-9, 137)
+_ERROR = re.compile(r"[\w.]+(Error|Exception)\b")
 
 
 def reconstruct_apart(
@@ -50,55 +61,71 @@ def reconstruct_apart(
     MeshError
         The process broke.
     """
-    home = str(Path(__file__).parents[2])
-    search = os.pathsep.join(filter(None, [home, os.environ.get("PYTHONPATH", "")]))
-    words = pickle.dumps((points, normals, depth, threads, scale), protocol=pickle.HIGHEST_PROTOCOL)
-    with subprocess.Popen(
-        [sys.executable, "-m", "o3d_relief.scan.poisson_process"],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        env={**os.environ, "PYTHONPATH": search},
-    ) as process:
-        try:
-            answer = _answer(process, words, tick)
-        except BaseException:
-            process.kill()
-            raise
-    if process.returncode != 0:
-        raise MeshError(
-            f"The reconstruction of the surface broke off (exit code {process.returncode}), most likely for "
-            f"want of memory: choose a depth below {depth}, or fewer points."
-        )
-    vertices, faces, density = pickle.loads(answer)
+    # Files, not pipes: a pipe that is full waits for somebody who reads.
+    with tempfile.TemporaryDirectory(prefix="o3d-relief-") as folder:
+        answer = Path(folder) / "surface.pickle"
+        with (Path(folder) / "points.pickle").open("w+b") as question:
+            pickle.dump((points, normals, depth, threads, scale), question, pickle.HIGHEST_PROTOCOL)
+            question.seek(0)
+            with (Path(folder) / "said.txt").open("w+b") as said:
+                code = _run(answer, question, said, tick)
+                said.seek(0)
+                words = said.read().decode(errors="replace").strip()
+        if code != 0:
+            raise MeshError(_reason(code, words, depth))
+        with answer.open("rb") as stream:
+            vertices, faces, density = pickle.load(stream)
     return vertices, faces, density
 
 
-def _answer(process: subprocess.Popen[bytes], words: bytes, tick: Tick) -> bytes:
-    """Give the process its input and wait for its output."""
-    to_send: bytes | None = words
-    while True:
-        tick(None)
+def _run(answer: Path, question: IO[bytes], said: IO[bytes], tick: Tick) -> int:
+    """Run the process to its end; return its exit code."""
+    program = _PROGRAM.format(path=sys.path, answer=str(answer))
+    hidden = int(getattr(subprocess, "CREATE_NO_WINDOW", 0))  # Windows would open a console
+    with subprocess.Popen(
+        [sys.executable, "-c", program],
+        stdin=question,
+        stdout=subprocess.DEVNULL,
+        stderr=said,
+        creationflags=hidden,
+    ) as process:
         try:
-            return process.communicate(to_send, timeout=_PAUSE)[0]
-        except subprocess.TimeoutExpired:
-            to_send = None  # it is sent as far as the process takes it
+            while True:
+                tick(None)
+                try:
+                    return process.wait(_PAUSE)
+                except subprocess.TimeoutExpired:
+                    continue
+        except BaseException:
+            process.kill()
+            raise
 
 
-def main() -> int:
-    """Answer one question from the standard input on the standard output.
+def _reason(code: int, words: str, depth: int) -> str:
+    """Say why the process broke."""
+    start = f"The reconstruction of the surface broke off (exit code {code})"
+    lines = words.splitlines()
+    last = next((line for line in reversed(lines) if _ERROR.match(line)), lines[-1] if lines else "").rstrip(
+        ".:"
+    )
+    if code in _OUT_OF_MEMORY or "MemoryError" in last or "bad_alloc" in words:
+        return f"{start} for want of memory: choose a depth below {depth}, or fewer points."
+    return f"{start}: {last}." if last else f"{start}."
+
+
+def main(answer: str) -> int:
+    """Answer the question on the standard input in a file.
+
+    Parameters
+    ----------
+    answer : str
 
     Returns
     -------
     int
         0.
     """
-    with os.fdopen(os.dup(1), "wb") as answer:
-        os.dup2(2, 1)  # whatever the libraries say shall not come in between
-        found = reconstruct(*pickle.load(sys.stdin.buffer))
-        pickle.dump(found, answer, protocol=pickle.HIGHEST_PROTOCOL)
+    found = reconstruct(*pickle.load(sys.stdin.buffer))
+    with Path(answer).open("wb") as stream:
+        pickle.dump(found, stream, pickle.HIGHEST_PROTOCOL)
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
