@@ -12,10 +12,12 @@ from scipy.sparse.csgraph import connected_components
 from o3d_relief.bounds.parts import PartSprings
 from o3d_relief.linalg.factor import Factor
 from o3d_relief.linalg.responses import Responses
-from o3d_relief.progress import Tick, silent
+from o3d_relief.progress import Progress
 from o3d_relief.stages.construction import leaders
 
 __all__ = ["LiveConstruction"]
+
+_NOBODY = Progress(None)
 
 _REMEMBERED = 4
 """Systems of scenes of several tied parts that are kept, for as many choices of the parts that are held."""
@@ -78,8 +80,8 @@ class LiveConstruction:
         The attenuation points.
     springs : PartSprings or None
         What ties the parts of a scene, if anything does.
-    tick : callable
-        Called with the share of the responses that is done; may call the work off.
+    progress : Progress
+        Told of the responses whenever they are computed; may call the work off.
 
     Raises
     ------
@@ -93,9 +95,9 @@ class LiveConstruction:
         laplacian: sp.csr_array,
         index: NDArray[np.int64],
         springs: PartSprings | None,
-        tick: Tick = silent,
+        progress: Progress = _NOBODY,
     ) -> None:
-        self._tick = tick
+        self._progress = progress
         self._vertices = vertices
         self._laplacian = laplacian
         self._index = index
@@ -208,7 +210,12 @@ class LiveConstruction:
         index = self._index[points]
         free = np.isin(self._label, self._label[index])
         free[index] = False
-        return Responses(form, self._vertices, index, free, keep_factor=keep_factor, tick=self._tick)
+        self._progress.begin("responses")
+        found = Responses(
+            form, self._vertices, index, free, keep_factor=keep_factor, tick=self._progress.tick
+        )
+        self._progress.end()
+        return found
 
 
 def _spread(columns: sp.csr_array, chosen: NDArray[np.bool_]) -> sp.csr_array:

@@ -120,11 +120,9 @@ class LivePoints:
         self._clusters = clusters_step(scene.vertices, params)
         self._chosen = chosen_points(scene.vertices, scene.visible, self._clusters)
         self._springs = scene.springs if params.in_order else None
-        progress.begin("responses")
         self._construction = LiveConstruction(
-            scene.vertices, scene.laplacian, self._chosen.index, self._springs, progress.tick
+            scene.vertices, scene.laplacian, self._chosen.index, self._springs, progress
         )
-        progress.end()
 
     def _needs(self, params: ReliefParams) -> tuple[int, int, bool]:
         return params.k, params.seed, params.in_order and self.scene.parts > 1

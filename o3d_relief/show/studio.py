@@ -33,6 +33,7 @@ Act = Callable[[ReliefEditor, bool], object]
 
 _GOES_ON = 1.5  # seconds between two values of one slider that count as one change
 _OPENING = "the responses of the surface"
+_FINISH = "finish"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -158,7 +159,8 @@ class Studio:
         """Say whether the relief is to be finished when the changes rest."""
         with self._change:
             self._finishing = wanted
-            self._called_off = not wanted
+            if self._now is not None and self._now.name == _FINISH:
+                self._called_off = not wanted
             self._change.notify_all()
         if not wanted:
             self.ask("preview", lambda _editor, _continued: None, changes=True)
@@ -210,23 +212,26 @@ class Studio:
                 due = [request for request in self._requests if request.due <= now]
                 if due:
                     self._requests.remove(due[0])
-                    self._called_off = False
-                    return due[0]
+                    return self._taken(due[0])
                 if self._requests:
                     self._change.wait(min(request.due for request in self._requests) - now)
                 elif self._finishing and self._unfinished and now < rested:
                     self._change.wait(rested - now)
                 elif self._finishing and self._unfinished:
                     self._unfinished = False
-                    return _Request(name="finish", act=self._finish, doing="", due=now, changes=False)
+                    finish = _Request(name=_FINISH, act=self._finish, doing="", due=now, changes=False)
+                    return self._taken(finish)
                 else:
                     self._change.wait()
         return None
 
+    def _taken(self, request: _Request) -> _Request:
+        self._now, self._called_off = request, False
+        return request
+
     def _carry_out(self, editor: ReliefEditor, request: _Request) -> None:
         name, when = self._last
         continued = name == request.name and time.monotonic() - when < _GOES_ON
-        self._now = request
         self._tell(doing=request.doing)
         try:
             request.act(editor, continued)
@@ -236,6 +241,9 @@ class Studio:
         except (ReliefError, MemoryError) as error:
             self._tell(sentence=_sentence(error), wrong=True)
             return
+        finally:
+            with self._change:
+                self._now = None
         if not request.changes:
             self._tell()
             return
@@ -254,29 +262,30 @@ class Studio:
         if self._editor is None:
             raise ReliefError("There is no relief yet.")
         if self._relief is None:
-            self._called_off = False
             self._relief = self._editor.relief(on_progress=self._watch)
         return self._relief
 
     def _watch_change(self, stage: str, share: float | None) -> bool:
         """Tell how far a change is; call it off where asked to, or where a newer one makes it void."""
-        if self._now is None:  # the beginning, without which there is nothing
+        if self._editor is None:  # the beginning, without which there is nothing
             if not self._closed:
                 self._tell(doing=stage, share=share)
             return not self._closed
         with self._change:
-            void = any(request.name == self._now.name for request in self._requests)
+            now = self._now
+            void = now is not None and any(request.name == now.name for request in self._requests)
         if void or self._called_off:
             return False
         self._tell(doing=stage, share=share)
         return True
 
     def _watch(self, stage: str, share: float | None) -> bool:
-        """Tell how far the relief is; call it off where somebody wants something else."""
+        """Tell how far the relief is; call it off where a change waits, but not while it is to be saved."""
         now = time.monotonic()
         with self._change:
+            finishing = self._now is not None and self._now.name == _FINISH
             waiting = any(request.due <= now and request.changes for request in self._requests)
-        if waiting or self._called_off:
+        if (waiting and finishing) or self._called_off:
             self._unfinished = waiting
             return False
         self._tell(doing=stage, share=share)

@@ -185,6 +185,37 @@ def test_a_slow_change_gives_way_to_the_next_of_its_kind(gallery, monkeypatch):
     gallery.wait(lambda studio: studio.sight.params.k == 10)
 
 
+@pytest.mark.parametrize("gallery", [{"params": ReliefParams(k=10), "finishing": False}], indirect=True)
+@pytest.mark.parametrize("then", ["change", "cancel", "close"])
+def test_what_happens_while_a_relief_is_saved(gallery, monkeypatch, tmp_path, then):
+    gallery.wait(lambda studio: studio.sight is not None)
+    asked, stop = [], gallery.studio.cancel if then == "cancel" else None
+
+    def watched():
+        if gallery.studio.work.doing == "order" and not asked:
+            asked.append(True)
+            if then == "change":
+                gallery.studio.change("beta", beta=0.1)
+            elif stop is not None:
+                stop()
+
+    monkeypatch.setattr(gallery.studio, "_on_news", watched)
+    gallery.studio.save_relief(tmp_path / "relief.ply")
+    if then == "close":
+        gallery.wait(lambda studio: studio.work.doing == "order")
+        gallery.studio.close()
+    elif then == "cancel":
+        gallery.wait(lambda studio: studio.work.sentence == "called off")
+    else:  # the save goes on, and the change comes after it
+        gallery.wait(lambda studio: studio.sight.params.beta == 0.1)
+    assert (tmp_path / "relief.ply").exists() == (then == "change")
+
+
+def test_a_slow_change_goes_on_where_nothing_is_to_be_finished(gallery, monkeypatch):
+    _slow_change(gallery, monkeypatch, lambda: gallery.studio.finish(wanted=False))
+    gallery.wait(lambda studio: studio.sight.params.k == 11)
+
+
 @pytest.mark.parametrize("gallery", [{"params": ReliefParams(k=10)}], indirect=True)
 def test_a_change_calls_off_the_relief_before(gallery):
     gallery.wait(lambda studio: studio.work.doing == "order")
