@@ -60,7 +60,7 @@ def batch(options: argparse.Namespace) -> int:
     earlier = f", {made.already_done} of them from an earlier run" if made.already_done else ""
     tell(f"{options.out}: {len(made.entries) - failed} reliefs{earlier}")
     if failed:
-        tell(f"{failed} inputs failed: see {options.out / MANIFEST}")
+        tell(f"{failed} of {len(made.entries)} inputs failed: see {options.out / MANIFEST}")
     for sheet in made.sheets:
         tell(f"look at {sheet}")
     if failed == len(made.entries):

@@ -20,6 +20,10 @@ if TYPE_CHECKING:
 __all__ = ["make_folder", "tell", "tell_result", "tell_stage", "write_report", "write_stages"]
 
 
+_LOOSE = 0.1
+"""Share of the energy that a search which has come to its end does not leave."""
+
+
 def tell(text: str) -> None:
     """Write a line for the user."""
     if sys.stderr is None:  # closed when the program was started
@@ -66,12 +70,19 @@ def tell_result(path: Path, relief: Relief, seconds: float, *, solids: Sequence[
     report = relief.summary()
     counts = {name: count for record in relief.stages.values() for name, count in record.counts.items()}
     if counts.get("already_shallower"):
-        tell(f"the relief is {report['relief_depth']:.4g} deep, less than was asked for: it is not stretched")
+        tell(
+            f"the relief is {report['relief_depth']:.4g} deep, in the unit of the file, less than was asked "
+            "for: it is not stretched (millimetres: --width-mm and --depth-mm)"
+        )
     if left := counts.get("left", 0):
         if relief.params.bounded:
             tell(f"{left} gaps are smaller than asked for: the depth has no room for them")
         else:
             tell(f"{left} pairs of surfaces could not be brought back into order; a smaller k may help")
+    gap = getattr(relief.stages.get("bounded"), "energy_gap", 0.0)
+    if gap > _LOOSE:
+        spared = f"{100.0 * gap:.0f} % of the change of shape"
+        tell(f"the search ended before its goal: up to {spared} might be spared")
     if missed := counts.get("attached_missed", 0):
         tell(f"{missed} vertices could not be attached to the plane: something seen lies behind them")
     if len(solids) > 1:

@@ -64,18 +64,19 @@ def make(options: argparse.Namespace) -> int:
         for note in lost_attributes(options.output, scene):
             tell(note)
     bar = StageBar()
+    scanned = None
     try:
         if meshing is not None and (options.dry_run or plate is not None):
             # Its size must be known before the relief is made.
-            found = scan_points(scene, meshing, view=view, on_stage=tell_stage, on_progress=bar)
-            scene, meshing = found.mesh, None
+            scanned = scan_points(scene, meshing, view=view, on_stage=tell_stage, on_progress=bar)
+            scene, meshing = scanned.mesh, None
         if options.dry_run:
-            tell_estimate(scene, params, view, plate or PlateParams(), tell)
+            tell_estimate(scene, params, view, plate or PlateParams(), tell, field=options.undercut_free)
             return 0
         if plate is not None and plate.depth_mm is not None:
             params = replace(params, depth=relief_depth(scene, view, plate))
         relief = make_relief(
-            scene,
+            scene if scanned is None else scanned,
             params,
             view=view,
             scan=meshing,
@@ -104,21 +105,25 @@ def _write(options: argparse.Namespace, relief: Relief, made: Made | None, taken
     from o3d_relief.scene.write import write_mesh
     from o3d_relief.workshop import write_work
 
+    failures: tuple[str, ...] = ()
     if options.strict or options.report is not None:
         with shown("certificate"):
-            _ = relief.certificate  # it is kept
-    if options.strict and relief.certificate.failures:
-        raise ReliefError(f"{options.output} is not written (--strict): {relief.certificate.failures[0]}")
-    if options.strict and made is not None and made.report.failures:
-        raise ReliefError(f"{options.output} is not written (--strict): {made.report.failures[0]}")
+            failures = tuple(relief.certificate.failures)
+        tell(f"certificate: {'fails' if failures else 'clean'}")
+        for sentence in failures:
+            tell(f"  {sentence}")
+    if options.report is not None:
+        write_report(options.report, relief, made)
+    if options.strict:  # why it is refused has been told, and is in the report
+        failures += () if made is None else tuple(made.report.failures)
+        if failures:
+            raise ReliefError(f"{options.output} is not written (--strict): {failures[0]}")
     solids: list[Path] = []
     with shown("writing"):
         if made is None:
             write_mesh(options.output, relief.mesh)
         else:
             solids = write_work(options.output, made.work, height_map=options.height_map, taken=taken)
-    if options.report is not None:
-        write_report(options.report, relief, made)
     if options.walls is not None and made is not None:
         made.draw_walls(options.walls)
     if options.stages is not None:

@@ -95,7 +95,13 @@ def make_checked(
 
 
 def tell_estimate(
-    mesh: o3d.geometry.TriangleMesh, params: ReliefParams, view: View, plate: PlateParams, tell: Tell
+    mesh: o3d.geometry.TriangleMesh,
+    params: ReliefParams,
+    view: View,
+    plate: PlateParams,
+    tell: Tell,
+    *,
+    field: bool = False,
 ) -> None:
     """Tell what a solid will measure.
 
@@ -107,13 +113,16 @@ def tell_estimate(
     plate : PlateParams
     tell : callable
         Takes a line.
+    field : bool
+        Whether it becomes a height field, whose triangles are as many as its pixels are small.
     """
     found = estimate_solid(mesh, params, view, plate)
     x, y, z = found.size_mm
     depth = f"{z:.2f}" if found.depth_known else f"at most {z:.2f}"
     tell(f"size      {x:.2f} x {y:.2f} x {depth} mm")
-    tell(f"volume    about {found.volume_mm3 / 1000.0:.0f} cm3")
+    tell(f"volume    {'about' if found.depth_known else 'at most'} {found.volume_mm3 / 1000.0:.0f} cm3")
     finer = ", more where textures become colours" if mesh.has_textures() else ""
+    finer += ", more in a height field" if field else ""
     tell(f"triangles about {found.triangles}{finer}")
     tell(f"memory    about {found.memory_mb / 1000.0:.1f} GB")
 

@@ -26,7 +26,7 @@ from o3d_relief.records import StageRecord, TrimStage, final_heights
 from o3d_relief.restoration_step import restoration_step
 from o3d_relief.scan_params import ScanParams
 from o3d_relief.scene.convert import mesh_arrays
-from o3d_relief.scene.scan import scan_points
+from o3d_relief.scene.scan import Scan, scan_points
 from o3d_relief.scene.weld import weld
 from o3d_relief.stages.trim import Trimmed
 from o3d_relief.steps import (
@@ -138,7 +138,7 @@ class Relief:
         dict
             Parameters and view, the depth of the scene and of the relief (everything and visible vertices
             alone, in the input's unit), the share of the visible vertices that lay behind S before the
-            trim, and the time and counts of each stage.
+            trim, in bounded mode the `energy_gap` of its stage, and the time and counts of each stage.
         """
         stages: dict[str, Any] = dict(self.stages)
         scene, z, visible = stages["scene"], final_heights(stages), stages["visibility"].visible
@@ -154,6 +154,7 @@ class Relief:
             "relief_depth": float(np.asarray(self.mesh.vertices)[:, 2].max()),
             "relief_visible_depth": float(np.ptp(z[visible])) * scene.unit,
             "visible_behind_share": float((z[visible] < 0.0).mean()),
+            "energy_gap": getattr(stages.get("bounded"), "energy_gap", None),
             "vertices": len(self.mesh.vertices),
             "triangles": len(self.mesh.triangles),
             "stages": {
@@ -164,7 +165,7 @@ class Relief:
 
 
 def make_relief(
-    mesh: o3d.geometry.TriangleMesh | o3d.geometry.PointCloud,
+    mesh: o3d.geometry.TriangleMesh | o3d.geometry.PointCloud | Scan,
     params: ReliefParams | None = None,
     *,
     view: View | None = None,
@@ -180,8 +181,8 @@ def make_relief(
 
     Parameters
     ----------
-    mesh : open3d.geometry.TriangleMesh or open3d.geometry.PointCloud
-        The scene; never modified. A point cloud is meshed first, see `scan_points`.
+    mesh : open3d.geometry.TriangleMesh, open3d.geometry.PointCloud or Scan
+        The scene; never modified. A point cloud is meshed first; a `Scan` is what `scan_points` made of one.
     params : ReliefParams, optional
     view : View, optional
         Where the scene faces; by default z is towards the viewer and y up.
@@ -226,6 +227,8 @@ def make_relief(
     if isinstance(mesh, o3d.geometry.PointCloud):
         scanned = scan_points(mesh, scan, view=view, on_stage=on_stage, on_progress=on_progress)
         mesh = scanned.mesh
+    elif scan is None and isinstance(mesh, Scan):
+        scanned, mesh = mesh, mesh.mesh
     elif scan is not None:
         raise ParameterError("scan says how a point cloud is meshed, but the scene is a mesh: leave it out.")
     journal = Journal(on_stage, None if scanned is None else scanned.stages, on_progress)

@@ -244,6 +244,10 @@ def test_strict_refuses_what_the_certificate_finds(tmp_path, scene, capsys):
     assert "is not written (--strict): " in sentence
     assert "visible vertices lie behind" in sentence
     assert _files(tmp_path) == ["scene.ply"]
+    report = tmp_path / "report.json"
+    _fails(capsys, "make", scene, out, "-k", "64", "--no-in-front", "--strict", "--report", report)
+    assert json.loads(report.read_text())["certificate"]["failures"]  # why is not lost
+    assert not out.exists()
 
 
 def test_version_and_module(tmp_path):

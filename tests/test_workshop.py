@@ -145,6 +145,23 @@ def test_the_height_map_replaces_nothing_that_is_needed(tmp_path, scene, capsys,
     assert _names(tmp_path) == []
 
 
+def test_no_seam_cuts_a_keyhole(tmp_path, scene, capsys):
+    words = (
+        "make",
+        scene,
+        tmp_path / "s.stl",
+        *SMALL,
+        "--tile",
+        "50x60",
+        "--hanging",
+        "keyhole",
+        "--base-mm",
+        6,
+    )
+    assert _run(*words) == 2
+    assert "a seam of the tiles may cut it: choose magnets." in capsys.readouterr().err
+
+
 def test_a_tile_does_not_replace_the_input(tmp_path, capsys):
     path = tmp_path / "relief_1.ply"
     o3d.io.write_triangle_mesh(str(path), to_mesh(bust(20)))

@@ -48,6 +48,8 @@ def filled_behind(piece: Piece, floor: float) -> list[Piece]:
         upright walls and the floor.
     """
     piece = piece.only(piece.area_normals()[:, 2] != 0.0)
+    if len(piece.faces) == 0:  # it stands upright all over: nothing is behind it
+        return []
     lines = followed(piece)
     for _ in range(_ROUNDS):
         torn = lines.torn

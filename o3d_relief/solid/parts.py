@@ -135,7 +135,8 @@ def _closed(piece: Piece, floor: float, thickness: float) -> tuple[str, list[Pie
             return "to_the_plate", [closed]
     if charts(piece).max() + 1 > _MOST_CHARTS:
         without_foot = piece.only((piece.vertices[piece.faces, 2] > floor).all(axis=1))
-        return "filled", _with_volume(filled_behind(without_foot, floor))
+        if behind := _with_volume(filled_behind(without_foot, floor)):
+            return "filled", behind
     return "thickened", _with_volume(shells(piece, thickness))
 
 

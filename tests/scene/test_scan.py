@@ -291,6 +291,12 @@ class TestRelief:
         inside = relief.source_index[relief.source_index >= 0]
         assert inside.max() < len(relief.stages["parts"].vertices)
 
+    def test_a_scan_is_gone_on_with(self, points):
+        scan = rel.scan_points(to_cloud(points[0]), rel.ScanParams(depth=6))
+        relief = rel.make_relief(scan, rel.ReliefParams(k=16))
+        assert list(relief.stages)[:8] == list(STAGES)
+        assert relief.scan == scan.params
+
     def test_a_mesh_has_no_scan(self):
         relief = rel.make_relief(to_mesh(hills()), rel.ReliefParams(k=8))
         assert relief.scan is relief.report()["scan"] is None

@@ -25,6 +25,11 @@ def _volume(piece, floor=-1.0):
     return sum(volume(part.vertices, part.faces) for part in pieces)
 
 
+def test_nothing_is_behind_what_stands_upright():
+    vertices = np.array([[0.0, 0, 1], [4, 0, 1], [4, 0, 3], [0, 0, 3]])
+    assert filled_behind(_piece(vertices, [[0, 1, 2], [0, 2, 3]]), -1.0) == []
+
+
 def test_a_sheet_stands_on_the_floor():
     assert _volume(_piece(*sheet(lambda x, y: 5 + 0 * x))) == pytest.approx(1600 * 6)
 
