@@ -1,7 +1,7 @@
 """How fast is it: python benchmarks/speed.py MESH... [--sizes N...] [--repeat N] [-k N] [--literal-up-to N].
 
-Runs in one process, in turn: (a) the package, with the paper's parameters and with its defaults; (b) a
-straightforward transcription of the paper, `literal.py`; (c) the floor: one visibility pass plus one
+Runs in one process, in turn: (a) the package, with the paper's parameters, with its defaults, and in bounded
+mode to a quarter of the scene's visible depth; (b) a straightforward transcription of the paper, `literal.py`; (c) the floor: one visibility pass plus one
 factorisation and solution of the construction's matrix with the fastest direct solver at hand (pypardiso or
 cholespy, in the extra "bench"). Ratios are taken within each round, medians over the rounds. Processor time
 counts all threads; it tells more than the clock where others share the machine. Memory is the peak above what
@@ -136,6 +136,8 @@ class Case:
         self._vertices, self._faces = stages["scene"].vertices, stages["scene"].faces
         self._fixed = stages["attenuation"].kept_index
         self.vertices = len(self._vertices)
+        depth = float(np.ptp(self._vertices[stages["visibility"].visible, 2])) * stages["scene"].unit
+        self.quarter = rel.ReliefParams(depth=depth / 4.0)
 
     def package(self, params: rel.ReliefParams) -> Cost:
         """Run the package."""
@@ -186,6 +188,7 @@ def measure(
             costs.setdefault("floor", []).append(case.floor(solve))
         if full:
             costs.setdefault("defaults", []).append(case.package(rel.ReliefParams(k=k)))
+            costs.setdefault("bounded", []).append(case.package(case.quarter))
         if literal:
             costs.setdefault("literal", []).append(case.literal())
     return costs
@@ -267,7 +270,7 @@ def main() -> None:
     parser.add_argument("-k", type=int, default=128)
     parser.add_argument("--literal-up-to", type=float, default=3e5, help="vertices up to which (b) is run")
     parser.add_argument("--floor-up-to", type=float, default=2e6, help="vertices up to which (c) is run")
-    parser.add_argument("--no-defaults", action="store_true", help="leave out the package's own parameters")
+    parser.add_argument("--no-defaults", action="store_true", help="leave out defaults and bounded mode")
     options = parser.parse_args()
     solver, solve = direct_solver()
     ball = o3d.geometry.TriangleMesh.create_sphere()
