@@ -1,11 +1,12 @@
 """How fast is it: python benchmarks/speed.py MESH... [--sizes N...] [--repeat N] [-k N] [--literal-up-to N].
 
 Runs in one process, in turn: (a) the package, with the paper's parameters, with its defaults, and in bounded
-mode to a quarter of the scene's visible depth; (b) a straightforward transcription of the paper, `literal.py`; (c) the floor: one visibility pass plus one
-factorisation and solution of the construction's matrix with the fastest direct solver at hand (pypardiso or
-cholespy, in the extra "bench"). Ratios are taken within each round, medians over the rounds. Processor time
-counts all threads; it tells more than the clock where others share the machine. Memory is the peak above what
-the process has with its libraries loaded, the mesh included.
+mode to a quarter of the scene's visible depth; (b) a straightforward transcription of the paper,
+`literal.py`; (c) the floor: one visibility pass plus one factorisation and solution of the construction's
+matrix with the fastest direct solver at hand (pypardiso or cholespy, in the extra "bench"). Ratios are taken
+within each round, medians over the rounds. Processor time counts all threads; it tells more than the clock
+where others share the machine. Memory is the peak above what the process has with its libraries loaded, the
+mesh included.
 """
 
 from __future__ import annotations
