@@ -112,11 +112,11 @@ def _write(options: argparse.Namespace, relief: Relief, made: Made | None, taken
         tell(f"certificate: {'fails' if failures else 'clean'}")
         for sentence in failures:
             tell(f"  {sentence}")
-    if options.report is not None:
-        write_report(options.report, relief, made)
-    if options.strict:  # why it is refused has been told, and is in the report
+    if options.strict:
         failures += () if made is None else tuple(made.report.failures)
         if failures:
+            if options.report is not None:  # why it is refused is not lost
+                write_report(options.report, relief, made)
             raise ReliefError(f"{options.output} is not written (--strict): {failures[0]}")
     solids: list[Path] = []
     with shown("writing"):
@@ -124,6 +124,8 @@ def _write(options: argparse.Namespace, relief: Relief, made: Made | None, taken
             write_mesh(options.output, relief.mesh)
         else:
             solids = write_work(options.output, made.work, height_map=options.height_map, taken=taken)
+    if options.report is not None:
+        write_report(options.report, relief, made)
     if options.walls is not None and made is not None:
         made.draw_walls(options.walls)
     if options.stages is not None:
