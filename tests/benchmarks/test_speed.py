@@ -31,7 +31,7 @@ def test_table_has_a_row_for_everything_that_is_run(tmp_path, monkeypatch, capsy
     speed.main()
     told = capsys.readouterr().out
     rows = [line.split("|")[1:-1] for line in told.split("GB per million")[1].splitlines() if "bust" in line]
-    assert [row[2].strip() for row in rows] == ["package", "floor", "defaults", "literal"] * 2
+    assert [row[2].strip() for row in rows] == ["package", "floor", "defaults", "bounded", "literal"] * 2
     for row in rows:
         assert float(row[4]) > 0.0
         if row[2].strip() == "floor":
