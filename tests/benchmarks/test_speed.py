@@ -36,7 +36,7 @@ def test_table_has_a_row_for_everything_that_is_run(tmp_path, monkeypatch, capsy
         assert float(row[4]) > 0.0
         if row[2].strip() == "floor":
             assert (float(row[5]), float(row[6])) == (1.0, 1.0)
-    assert abs(int(rows[4][1].replace(",", "")) - 1500) < 300
+    assert abs(int(rows[5][1].replace(",", "")) - 1500) < 300
 
 
 def test_ratios_are_taken_round_by_round():
