@@ -1,6 +1,7 @@
 """A real window of the live editor: clicked and dragged, looked at, closed."""
 
 import os
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -94,6 +95,17 @@ def red(panel):
     return int(((r > 180) & (g < 150) & (b < 130) & (r - g > 80)).sum())
 
 
+def closed(screen, editor):
+    """Close the window; return the exit code. A window that computes may miss a key: it is pressed again."""
+    for _ in range(8):
+        screen.do("key", "ctrl+q")
+        try:
+            return editor.process.wait(timeout=15)
+        except subprocess.TimeoutExpired:
+            continue
+    return None
+
+
 def furnished(scene, _panel):
     """Tell whether the grey plate is there."""
     light = scene.max(axis=2)
@@ -127,8 +139,7 @@ def test_sliders_points_and_files(screen, editor, tmp_path):
     while not (tmp_path / "relief.ply").exists():
         assert time.monotonic() < end
         time.sleep(0.2)
-    screen.do("key", "ctrl+q")
-    assert editor.process.wait(timeout=120) == 0, editor.lines()
+    assert closed(screen, editor) == 0, editor.lines()
 
     params, view = load_params(tmp_path / "params.json")
     assert params.alpha == pytest.approx(0.05 + 0.95 * 0.3, abs=0.03)  # the slider begins at 0.05
@@ -146,8 +157,7 @@ def test_closed_in_mid_computation(screen, editor, tmp_path):
     eye = Eye(screen)
     eye.wait(furnished)
     screen.drag(eye.window, at(0.2, BETA), at(0.5, BETA))  # the relief is made anew
-    screen.do("key", "ctrl+q")
-    assert editor.process.wait(timeout=120) == 0, editor.lines()
+    assert closed(screen, editor) == 0, editor.lines()
     params, _ = load_params(tmp_path / "params.json")
     assert params.beta > 0.2
     assert not [line for line in editor.lines() if "Traceback" in line]
