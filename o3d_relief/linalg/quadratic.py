@@ -55,7 +55,7 @@ def minimise(
     Returns
     -------
     (n,) float64 or None
-        None where no x fulfils all inequalities, or none was found. They hold up to about 1e-5.
+        None where no x fulfils all inequalities, or none was found. They hold up to 1e-3, most to 1e-6.
 
     Examples
     --------
