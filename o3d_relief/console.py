@@ -21,7 +21,7 @@ __all__ = ["make_folder", "tell", "tell_result", "tell_stage", "write_report", "
 
 
 _LOOSE = 0.1
-"""Share of the energy that a search which has come to its end does not leave."""
+"""Gap of the energy, as a share of it, of which the user is told: a search that is complete leaves 0.03."""
 
 
 def tell(text: str) -> None:
@@ -79,8 +79,8 @@ def tell_result(path: Path, relief: Relief, seconds: float, *, solids: Sequence[
             tell(f"{left} gaps are smaller than asked for: the depth has no room for them")
         else:
             tell(f"{left} pairs of surfaces could not be brought back into order; a smaller k may help")
-    gap = getattr(relief.stages.get("bounded"), "energy_gap", 0.0)
-    if gap > _LOOSE:
+    gap = report["energy_gap"]
+    if gap is not None and gap > _LOOSE:
         spared = f"{100.0 * gap:.0f} % of the change of shape"
         tell(f"the search ended before its goal: up to {spared} might be spared")
     if missed := counts.get("attached_missed", 0):

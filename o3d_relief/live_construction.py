@@ -12,12 +12,10 @@ from scipy.sparse.csgraph import connected_components
 from o3d_relief.bounds.parts import PartSprings
 from o3d_relief.linalg.factor import Factor
 from o3d_relief.linalg.responses import Responses
-from o3d_relief.progress import Progress
+from o3d_relief.progress import NOBODY, Progress
 from o3d_relief.stages.construction import leaders
 
 __all__ = ["LiveConstruction"]
-
-_NOBODY = Progress(None)
 
 _REMEMBERED = 4
 """Systems of scenes of several tied parts that are kept, for as many choices of the parts that are held."""
@@ -95,7 +93,7 @@ class LiveConstruction:
         laplacian: sp.csr_array,
         index: NDArray[np.int64],
         springs: PartSprings | None,
-        progress: Progress = _NOBODY,
+        progress: Progress = NOBODY,
     ) -> None:
         self._progress = progress
         self._vertices = vertices

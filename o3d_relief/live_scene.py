@@ -18,7 +18,7 @@ from o3d_relief.linalg.laplacian import cotangent_laplacian
 from o3d_relief.live_construction import LiveConstruction
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.point_edits import PointEdit
-from o3d_relief.progress import Progress
+from o3d_relief.progress import NOBODY, Progress
 from o3d_relief.records import AttenuationStage
 from o3d_relief.scene.convert import mesh_arrays
 from o3d_relief.stages.attenuation import attenuate
@@ -33,8 +33,6 @@ from o3d_relief.steps import (
 )
 
 __all__ = ["LivePoints", "LiveScene"]
-
-_NOBODY = Progress(None)
 
 
 class LiveScene:
@@ -59,7 +57,7 @@ class LiveScene:
         mesh: o3d.geometry.TriangleMesh,
         params: ReliefParams,
         view: View,
-        progress: Progress = _NOBODY,
+        progress: Progress = NOBODY,
     ) -> None:
         progress.begin("scene")
         in_vertices, in_faces = mesh_arrays(mesh)
@@ -112,7 +110,7 @@ class LivePoints:
         A system is singular.
     """
 
-    def __init__(self, scene: LiveScene, params: ReliefParams, progress: Progress = _NOBODY) -> None:
+    def __init__(self, scene: LiveScene, params: ReliefParams, progress: Progress = NOBODY) -> None:
         check_k(params, len(scene.vertices))
         progress.begin("clusters")
         self.scene = scene

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from o3d_relief.errors import Cancelled
 
-__all__ = ["OnProgress", "Progress", "Tick", "share_of_way", "silent"]
+__all__ = ["NOBODY", "OnProgress", "Progress", "Tick", "share_of_way", "silent"]
 
 OnProgress = Callable[[str, float | None], object]
 """Takes the name of a stage and the share of it that is done, from 0 to 1, None where that is not known.
@@ -85,6 +85,10 @@ class Progress:
     def _tell(self) -> None:
         if self._on_progress is not None and self._on_progress(self._stage, self._share) is False:
             raise Cancelled(f"The work was called off, in the stage {self._stage}.")
+
+
+NOBODY = Progress(None)
+"""Tells nobody, and is never called off."""
 
 
 def share_of_way(first: float, now: float, goal: float) -> float:

@@ -139,8 +139,7 @@ def check_workshop(plate: PlateParams | None, mill: MillParams | None, tiles: Ti
     Raises
     ------
     ParameterError
-        A tool wider than the piece, a plate too thin for the pins, tiles smaller than their pins, a keyhole
-        in tiles.
+        A tool wider than the piece, a plate too thin for the pins, tiles smaller than their pins.
     """
     if plate is None:
         return
@@ -148,11 +147,6 @@ def check_workshop(plate: PlateParams | None, mill: MillParams | None, tiles: Ti
         raise ParameterError(
             f"tool_mm must be smaller than the piece, which is {plate.width_mm:g} mm wide. "
             f"Got {mill.tool_mm:g} instead."
-        )
-    if tiles is not None and plate.hanging == "keyhole":
-        raise ParameterError(
-            'hanging="keyhole" is one hole for the whole piece, and a seam of the tiles may cut it: choose '
-            "magnets."
         )
     if tiles is not None:
         tiles.pin_for(plate.back_mm)

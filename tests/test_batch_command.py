@@ -39,7 +39,7 @@ def test_exit_codes_and_lines(monkeypatch, capsys, entries, code):
     told = capsys.readouterr().err
     assert ("/a/x.ply -> x.obj: 9 triangles, 3 deep, 1.2 s\n  No uvs.\n" in told) == (MADE in entries)
     assert ("failed: /a/y.ply is empty.\n" in told) == (FAILED in entries)
-    assert ("inputs failed: see out" in told) == (FAILED in entries)
+    assert (f"1 of {len(entries)} inputs failed: see out" in told) == (FAILED in entries)
 
 
 def test_an_error_that_does_not_name_its_file(monkeypatch, capsys):

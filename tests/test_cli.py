@@ -440,9 +440,33 @@ def test_dry_run_writes_nothing(tmp_path, scene, capsys):
     assert "x 15.00 mm" in told
     assert "volume    about" in told
     assert "memory    about" in told
-    assert main(["make", str(scene), str(out), "--dry-run"]) == 0
-    assert "at most" in capsys.readouterr().err
+    assert "triangles about" in told
+    assert "more" not in told
+    assert main(["make", str(scene), str(out), "--dry-run", "--undercut-free"]) == 0
+    told = capsys.readouterr().err
+    assert "x at most" in told
+    assert "volume    at most" in told
+    assert ", more in a height field" in told
     assert _files(tmp_path) == ["scene.ply"]
+
+
+def test_dry_run_of_a_textured_mesh(tmp_path, capsys):
+    mesh = to_mesh(bust(20))
+    mesh.triangle_uvs = o3d.utility.Vector2dVector(np.zeros((3 * len(mesh.triangles), 2)))
+    mesh.textures = [o3d.geometry.Image(np.zeros((2, 2, 3), dtype=np.uint8))]
+    mesh.triangle_material_ids = o3d.utility.IntVector(np.zeros(len(mesh.triangles), dtype=np.int32))
+    write_mesh(tmp_path / "scene.obj", mesh)
+    assert main(["make", str(tmp_path / "scene.obj"), "s.stl", "--dry-run", "--width-mm", "90"]) == 0
+    assert ", more where textures become colours" in capsys.readouterr().err
+
+
+def test_a_search_that_does_not_come_to_its_end_is_told(tmp_path, scene, capsys, monkeypatch):
+    words = ["make", str(scene), str(tmp_path / "r.ply"), "--depth", "9"]
+    assert main(words) == 0
+    assert "the search ended" not in capsys.readouterr().err
+    monkeypatch.setattr("o3d_relief.linalg.interior._ROUNDS", 1)
+    assert main(words) == 0
+    assert "the search ended before its goal: up to " in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

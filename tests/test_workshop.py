@@ -145,21 +145,13 @@ def test_the_height_map_replaces_nothing_that_is_needed(tmp_path, scene, capsys,
     assert _names(tmp_path) == []
 
 
-def test_no_seam_cuts_a_keyhole(tmp_path, scene, capsys):
-    words = (
-        "make",
-        scene,
-        tmp_path / "s.stl",
-        *SMALL,
-        "--tile",
-        "50x60",
-        "--hanging",
-        "keyhole",
-        "--base-mm",
-        6,
-    )
-    assert _run(*words) == 2
-    assert "a seam of the tiles may cut it: choose magnets." in capsys.readouterr().err
+@pytest.mark.parametrize(("tile", "cut"), [("50x200", True), ("200x200", False)])
+def test_a_seam_through_a_keyhole_is_told(tmp_path, scene, capsys, tile, cut):
+    words = ("make", scene, tmp_path / "s.stl", *SMALL, "--base-mm", 6, "--hanging", "keyhole")
+    assert _run(*words, "--tile", tile) == 0
+    assert (
+        "seams cut 1 of the holes that the back hangs by: choose another size" in capsys.readouterr().err
+    ) == cut
 
 
 def test_a_tile_does_not_replace_the_input(tmp_path, capsys):

@@ -8,6 +8,7 @@ import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
+from o3d_relief.errors import MeshError
 from o3d_relief.plate_params import PlateParams
 from o3d_relief.rays import unit_box
 from o3d_relief.solid.body import built
@@ -35,9 +36,16 @@ def joined(whole: manifold3d.Manifold, params: PlateParams) -> tuple[manifold3d.
     counts : dict of str to float
         Voids filled, crumbs (smaller than a drop from the nozzle) left out, and the loose bodies with
         their volume in cubic millimetres, as they were before they were bridged or removed.
+
+    Raises
+    ------
+    MeshError
+        There is no body of positive volume.
     """
     import manifold3d
 
+    if whole.is_empty() or whole.volume() <= 0.0:
+        raise MeshError("Nothing of the relief has a volume: no solid can be made of it.")
     properties, corners, target, label = _labelled(whole)
     volumes, rear = _measured(properties[:, :3], corners, label)
     crumb = _crumbs(volumes, params)

@@ -25,6 +25,10 @@ if TYPE_CHECKING:
 __all__ = ["Tile", "Tiling", "make_tiles"]
 
 _MOST_TILES = 400
+_POCKET_SLICES = (0.98, 0.75, 0.5)
+"""Heights, as shares of the plate's thickness, at which pockets are looked for: keyholes are wider inside."""
+_LEAST_POCKET = 1.0
+"""Square millimetres; smaller ones are rounding errors."""
 _ENGRAVED = 0.4
 """Depth of the numbers in millimetres: two usual layers, less than the wall behind them."""
 
@@ -63,7 +67,7 @@ class Tiling:
         Diameter of the pins and how far they stand out.
     counts : mapping of str to int
         Rows, columns, tiles, joints, pins, joints without room for a pin, tiles without room for a number,
-        and loose parts: those that no tile holds.
+        holes in the back that a seam cuts, and loose parts: those that no tile holds.
     """
 
     tiles: tuple[Tile, ...]
@@ -155,9 +159,35 @@ def make_tiles(solid: Solid, params: TileParams) -> Tiling:
             "pins": sum(len(found) for found in places.values()),
             "joints_without_pins": sum(len(found) == 0 for found in places.values()),
             "unnumbered": unnumbered,
+            "pockets_cut": _cut_pockets(whole, float(low[2]), x, y),
             "loose": loose,
         },
     )
+
+
+def _cut_pockets(
+    whole: manifold3d.Manifold, back: float, x: NDArray[np.float64], y: NDArray[np.float64]
+) -> int:
+    """Count the holes in the back that seams run through: half a keyhole pushes two tiles apart."""
+    front = whole.slice(0.02 * back)
+    pockets = _enclosed(whole.slice(_POCKET_SLICES[0] * back)) ^ front
+    for share in _POCKET_SLICES[1:]:
+        inner = (_enclosed(whole.slice(share * back)) ^ front).decompose()
+        pockets = sum((one for one in inner if (one ^ pockets).area() > _LEAST_POCKET), pockets)
+    bounds = np.array([one.bounds() for one in pockets.decompose()]).reshape(-1, 4)
+    cut = np.zeros(len(bounds), dtype=bool)
+    for axis, seams in enumerate((x[1:-1], y[1:-1])):
+        begin, end = bounds[:, axis, None], bounds[:, axis + 2, None]
+        cut |= ((begin < seams) & (seams < end)).any(axis=1)
+    return int(cut.sum())
+
+
+def _enclosed(area: manifold3d.CrossSection) -> manifold3d.CrossSection:
+    """Return the holes of an area."""
+    import manifold3d
+
+    outlines = [ring for ring in area.to_polygons() if manifold3d.CrossSection([ring]).area() > 0.0]
+    return manifold3d.CrossSection(outlines, manifold3d.FillRule.Positive) - area
 
 
 def _count(extent: float, largest: float, length: float) -> int:

@@ -1,3 +1,4 @@
+import manifold3d
 import numpy as np
 import pytest
 import trimesh
@@ -7,6 +8,7 @@ import o3d_relief as rel
 from o3d_relief.errors import MeshError, ParameterError
 from o3d_relief.plate_params import PlateParams
 from o3d_relief.scene.arrays import MeshArrays
+from o3d_relief.solid.bodies import joined
 from o3d_relief.solid.body import PLATE_COLOR
 from o3d_relief.solid.checks import check_solid
 from o3d_relief.solid.make import solid_of
@@ -208,6 +210,11 @@ def test_a_frame_stands_around():
     edge = framed.vertices[np.abs(framed.vertices[:, 0]) > framed.size[0] / 2 - 1e-9]
     assert edge[:, 2].max() == pytest.approx(5.0)
     assert framed.size[0] == pytest.approx(plain.size[0] + 10.0)
+
+
+def test_bodies_without_volume_are_no_solid():
+    with pytest.raises(MeshError, match="Nothing of the relief has a volume"):
+        joined(manifold3d.Manifold(), PlateParams(shape="none"))
 
 
 @pytest.mark.parametrize(("hanging", "base"), [("keyhole", 5.0), ("magnets", 4.0)])

@@ -5,9 +5,11 @@ import pytest
 import trimesh
 
 from o3d_relief.errors import ParameterError
+from o3d_relief.plate_params import PlateParams
 from o3d_relief.solid.body import PLATE_COLOR, Solid
 from o3d_relief.solid.fragments import held
 from o3d_relief.solid.numerals import engraving
+from o3d_relief.solid.plate import pockets
 from o3d_relief.solid.tiles import make_tiles
 from o3d_relief.workshop_params import TileParams
 from slabs import ball_on_slab, plain, plate, slab
@@ -27,6 +29,21 @@ def large():
     # Nothing reaches through the back.
     ball = ball - plain(manifold3d.Manifold.cube([200, 200, 50]).translate([-100, -100, -56.0]))
     return Solid.from_manifold(plate(330.0, 200.0, 6.0) + ball, colored=False)
+
+
+@pytest.fixture(scope="module")
+def hung():
+    """300 x 200 mm and 6 thick, a keyhole in the middle of its back."""
+    params = PlateParams(shape="rectangle", base_mm=6.0, hanging="keyhole")
+    outline = manifold3d.CrossSection.square((300.0, 200.0), True)
+    return Solid.from_manifold(plate(300.0, 200.0, 6.0) - pockets(outline, params), colored=False)
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "cut"), [(160, 210, 1), (310, 18, 1), (120, 210, 0), (310, 210, 0)]
+)
+def test_seams_through_a_keyhole_are_counted(hung, width, height, cut):
+    assert make_tiles(hung, TileParams(width_mm=width, height_mm=height)).counts["pockets_cut"] == cut
 
 
 def test_tiles_are_closed_and_fit_the_printer(large):
