@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from o3d_relief.bounds.bounded import closest_relief, lowest_seen
 from o3d_relief.bounds.extremes import extreme_pairs
-from o3d_relief.bounds.pairs import Pairs, grid_pairs, vertex_pairs
+from o3d_relief.bounds.grid import grid_pairs
+from o3d_relief.bounds.pairs import Pairs, vertex_pairs
 from o3d_relief.bounds.parts import tie_parts
 from o3d_relief.bounds.seen import face_weights, point_rows, seen_faces, seen_points
 from o3d_relief.bounds.silhouettes import silhouette_pairs

@@ -17,7 +17,8 @@ import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
-from o3d_relief.bounds.pairs import Pairs, grid_pairs, vertex_pairs
+from o3d_relief.bounds.grid import grid_pairs
+from o3d_relief.bounds.pairs import Pairs, vertex_pairs
 from o3d_relief.errors import ParameterError
 from o3d_relief.scene.convert import arrays_mesh, mesh_arrays
 from o3d_relief.scene.frame import RELIEF_UNITS

@@ -7,8 +7,9 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from o3d_relief.bounds.bends import bend_of
+from o3d_relief.bounds.grid import grid_pairs
 from o3d_relief.bounds.order import Ordered, keep_order
-from o3d_relief.bounds.pairs import Pairs, close_pairs, grid_pairs
+from o3d_relief.bounds.pairs import Pairs, close_pairs
 from o3d_relief.bounds.silhouettes import silhouette_pairs
 from o3d_relief.bounds.stiffness import Stiffness
 from o3d_relief.linalg.laplacian import vertex_areas

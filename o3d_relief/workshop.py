@@ -85,8 +85,8 @@ class Work:
                 told.append(f"{counts['joints_without_pins']} joints have no room for a pin: glue them")
             if counts["pockets_cut"]:
                 told.append(
-                    f"seams cut {counts['pockets_cut']} of the holes that the back hangs by: choose another size "
-                    "of the tiles"
+                    f"seams cut {counts['pockets_cut']} of the holes that the back hangs by: choose another "
+                    "size of the tiles"
                 )
             if counts["loose"]:
                 told.append(f"{counts['loose']} loose parts lie in the tiles: glue them where they belong")

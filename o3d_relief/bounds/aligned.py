@@ -7,17 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from o3d_relief.bounds.pairs import Pairs
+from o3d_relief.bounds.pairs import Pairs, as_points
 
-__all__ = ["Footprints", "aligned_pairs", "footprints"]
+__all__ = ["APART", "Footprints", "aligned_pairs", "footprints"]
 
 _ON = 1e-3
 """A point lies on an edge, in the picture, within this many relief units."""
 
-_APART = 5e-4
+APART = 5e-4
 """Smallest gap in relief units: edges that touch are in no order."""
 
-_SAME = 1e-4
+_ONE_PLACE = 1e-4
 """Rounding, in relief units, by which points count as one in the picture: what is missed costs time only."""
 
 
@@ -74,7 +74,7 @@ def footprints(
     plane = vertices[:, :2]
     chosen = chosen[np.abs(plane[edges[chosen, 1]] - plane[edges[chosen, 0]]).max(axis=1) > _ON]
     left, right = _beside(plane, faces, edges, chosen)
-    ends = _numbered(np.rint(plane[edges[chosen].ravel()] / _SAME)).reshape(-1, 2)
+    ends = _numbered(np.rint(plane[edges[chosen].ravel()] / _ONE_PLACE)).reshape(-1, 2)
     turned = ends[:, 0] > ends[:, 1]
     left, right = np.where(turned, right, left), np.where(turned, left, right)
     key = (ends.min(axis=1) * (ends.max(initial=0) + 1) + ends.max(axis=1)) * 4 + 2 * left + right
@@ -227,7 +227,7 @@ def _next_on(
     own = vertices[tip, 2]
     found = []
     for sign in (1.0, -1.0):  # the next one below, the next one above
-        place = np.concatenate([sign * height + _APART, sign * own])
+        place = np.concatenate([sign * height + APART, sign * own])
         query = np.concatenate([of, np.arange(len(tip))])
         order = np.lexsort((place, query))
         is_edge = order < len(edge)
@@ -247,15 +247,8 @@ def _as_pairs(
     edge: NDArray[np.int64],
     share: NDArray[np.float64],
 ) -> Pairs:
-    corners, weights = np.repeat(tip[:, None], 3, axis=1), np.tile([1.0, 0.0, 0.0], (len(tip), 1))
+    own = as_points(tip)
     others = edges[edge][:, [0, 1, 1]]
     other_weights = np.stack([1.0 - share, share, np.zeros_like(share)], axis=1)
     difference = vertices[tip, 2] - np.einsum("qc,qc->q", vertices[others, 2], other_weights)
-    above = (difference > 0.0)[:, None]
-    return Pairs(
-        upper=np.where(above, corners, others),
-        upper_weights=np.where(above, weights, other_weights),
-        lower=np.where(above, others, corners),
-        lower_weights=np.where(above, other_weights, weights),
-        gap=np.abs(difference),
-    )
+    return Pairs.sorted_by(difference > 0.0, own, (others, other_weights), np.abs(difference))

@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 
 from o3d_relief.bounds.bends import normal_changes
 from o3d_relief.bounds.crossings import crossings, edges_of
+from o3d_relief.bounds.grid import grid_pairs
 from o3d_relief.bounds.inversions import inversions
+from o3d_relief.bounds.lines import upright
 from o3d_relief.bounds.origin import Origin
-from o3d_relief.bounds.pairs import grid_pairs, upright, vertex_pairs
+from o3d_relief.bounds.pairs import vertex_pairs
 from o3d_relief.bounds.places import Place, behind_places, crossing_places, told
 
 __all__ = ["Certificate", "certify"]

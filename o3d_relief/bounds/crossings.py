@@ -10,9 +10,10 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from o3d_relief.bounds.pairs import Pairs
+from o3d_relief.bounds.ragged import combined
 from o3d_relief.rays import unit_box
 
-__all__ = ["Crossings", "around", "crossings", "edges_of", "new_crossings"]
+__all__ = ["Crossings", "around", "cross", "crossings", "edges_of", "new_crossings"]
 
 _DEEP = 1e-3
 """An edge pierces a triangle where it reaches at least this far, in relief units, to both of its sides and,
@@ -91,13 +92,11 @@ class Crossings:
         edge_weights = np.stack([1.0 - along, along, np.zeros_like(along)], axis=1)
         face_corners = np.repeat(self.face, 2, axis=0)
         face_weights = self.inside.reshape(-1, 3)
-        above = edge_above[:, None]
-        return Pairs(
-            upper=np.where(above, edge_corners, face_corners),
-            upper_weights=np.where(above, edge_weights, face_weights),
-            lower=np.where(above, face_corners, edge_corners),
-            lower_weights=np.where(above, face_weights, edge_weights),
-            gap=np.where(edge_above, gap.ravel(), -gap.ravel()),
+        return Pairs.sorted_by(
+            edge_above,
+            (edge_corners, edge_weights),
+            (face_corners, face_weights),
+            np.where(edge_above, gap.ravel(), -gap.ravel()),
         )
 
     def select(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Crossings:
@@ -201,12 +200,12 @@ def crossings(vertices: NDArray[np.float64], faces: NDArray[np.int64], edges: ND
 def _stretches(plane: NDArray[np.float64], edge: NDArray[np.int64], face: NDArray[np.int64]) -> Crossings:
     """Clip each edge, seen from the front, to its triangle."""
     a, b, c = (plane[face[:, i]] for i in range(3))
-    area = _cross(b - a, c - a)
+    area = cross(b - a, c - a)
     safe = np.where(area == 0.0, 1.0, area)
     at_ends = []
     for end in (0, 1):
         p = plane[edge[:, end]]
-        second, third = _cross(p - a, c - a) / safe, _cross(b - a, p - a) / safe
+        second, third = cross(p - a, c - a) / safe, cross(b - a, p - a) / safe
         at_ends.append(np.stack([1.0 - second - third, second, third], axis=1))
     first, change = at_ends[0], at_ends[1] - at_ends[0]
     moving = change != 0.0
@@ -222,7 +221,8 @@ def _stretches(plane: NDArray[np.float64], edge: NDArray[np.int64], face: NDArra
     return everything.select((begin <= finish) & (from_border > _DEEP))
 
 
-def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the cross products of vectors of the picture, (q, 2) each: (q,)."""
     return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
 
@@ -248,10 +248,7 @@ def around(found: Crossings, vertices: NDArray[np.float64], faces: NDArray[np.in
     beside = sp.csr_array(entries, shape=(n, m))
     query, at_edge = _beside(beside, found.edge)
     other_query, at_face = _beside(beside, found.face)
-    count = np.bincount(other_query, minlength=len(found))
-    times, begin = count[query], (np.cumsum(count) - count)[query]
-    first = np.repeat(np.arange(len(query)), times)
-    second = begin[first] + np.arange(len(first)) - (np.cumsum(times) - times)[first]
+    first, second = combined(query, other_query)
     one, other = np.divmod(_once(at_edge[first] * m + at_face[second]), m)
     one, other = np.concatenate([one, other]), np.concatenate([other, one])
     low, high = (extreme(vertices[:, :2][faces], axis=1) for extreme in (np.min, np.max))

@@ -7,8 +7,10 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from o3d_relief.bounds.crossings import Crossings, crossings, edges_of
+from o3d_relief.bounds.grid import grid_pairs
+from o3d_relief.bounds.lines import upright
 from o3d_relief.bounds.origin import Origin
-from o3d_relief.bounds.pairs import Pairs, foot_pairs, grid_pairs, upright, vertex_pairs
+from o3d_relief.bounds.pairs import Pairs, foot_pairs, vertex_pairs
 from o3d_relief.bounds.rows import gap_rows
 from o3d_relief.stages.trim import trim_behind
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from o3d_relief.bounds.correction import Correction
 from o3d_relief.bounds.crossings import edges_of, new_crossings
 from o3d_relief.bounds.pairs import Pairs, foot_pairs
+from o3d_relief.bounds.raster import Raster
 from o3d_relief.progress import Tick, share_of_way, silent
 
 __all__ = ["Ordered", "keep_order", "out_of_order", "worst_of_stacks"]
@@ -31,9 +32,6 @@ _ROUNDS = 40
 
 _FEW = 3000
 """Pairs out of order on lines up to which edges that pierce triangles are looked for at the same time."""
-
-_CELLS = 256
-"""Raster, to each side, on which is looked up what lies above and below what moved."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -174,7 +172,7 @@ class _BetweenLines:
 
     def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
         self._vertices, self._faces = vertices, faces
-        self._edges, self._raster = edges_of(faces), _Raster(vertices, faces)
+        self._edges, self._raster = edges_of(faces), Raster(vertices, faces)
         self._last = np.full(len(vertices), np.nan)
 
     def look_at(self, z: NDArray[np.float64]) -> tuple[Pairs, int]:
@@ -234,32 +232,6 @@ class _Lines:
         self._held |= new
         self._ever |= new
         return self._pairs.select(new)
-
-
-class _Raster:
-    """Boxes of triangles, seen from the front, in cells."""
-
-    def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
-        low, high = vertices[:, :2].min(axis=0), vertices[:, :2].max(axis=0)
-        cell = np.ascontiguousarray(((vertices[:, :2] - low) / (high - low + 1e-9) * _CELLS).T).astype(
-            np.int64
-        )
-        a, b, c = (cell[:, corner] for corner in np.ascontiguousarray(faces.T))
-        self._first = np.minimum(np.minimum(a, b), c)
-        self._last = np.maximum(np.maximum(a, b), c) + 1
-
-    def over_or_under(self, changed: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Find the triangles (m,) that may lie above or below some of them, (m,)."""
-        (left, bottom), (right, top) = self._first, self._last
-        # Count, in each cell of a raster, the boxes of triangles that changed; then ask for the boxes of all.
-        steps = np.zeros((_CELLS + 1, _CELLS + 1), dtype=np.int64)
-        for x, y, sign in ((left, bottom, 1), (right, top, 1), (left, top, -1), (right, bottom, -1)):
-            np.add.at(steps, (x[changed], y[changed]), sign)
-        marked = steps.cumsum(axis=0).cumsum(axis=1)[:-1, :-1] > 0
-        total = np.zeros((_CELLS + 1, _CELLS + 1), dtype=np.int64)
-        total[1:, 1:] = marked.cumsum(axis=0).cumsum(axis=1)
-        within = total[right, top] - total[left, top] - total[right, bottom] + total[left, bottom]
-        return np.asarray(within > 0)
 
 
 def _wanted_gaps(pairs: Pairs, min_gap: float) -> NDArray[np.float64]:

@@ -6,6 +6,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from o3d_relief.bounds.ragged import combined
+
 __all__ = ["Origin", "triangles_cross"]
 
 _ROUNDING = 1e-9
@@ -72,12 +74,8 @@ class Origin:
         """Return all combinations of the triangles at both places: number of the query, both triangles."""
         query, first = self._at(one)
         second_query, second = self._at(other)
-        count = np.bincount(second_query, minlength=len(one))
-        begin = np.cumsum(count) - count
-        times = count[query]
-        row = np.repeat(np.arange(len(query)), times)
-        within = np.arange(len(row)) - np.repeat(np.cumsum(times) - times, times)
-        return query[row], first[row], second[begin[query[row]] + within]
+        row, column = combined(query, second_query)
+        return query[row], first[row], second[column]
 
     def _at(self, places: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Return the triangles that hold all vertices of each place: numbers of places, rising, and faces."""

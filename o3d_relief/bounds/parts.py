@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from o3d_relief.bounds.pairs import Pairs, touching_pairs
+from o3d_relief.bounds.pairs import Pairs
+from o3d_relief.bounds.touching import touching_pairs
 
 __all__ = ["PartSprings", "Ties", "find_springs", "tie_parts"]
 

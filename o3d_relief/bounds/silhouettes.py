@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from o3d_relief.bounds.aligned import aligned_pairs, footprints
-from o3d_relief.bounds.crossings import edges_of
+from o3d_relief.bounds.aligned import APART, aligned_pairs, footprints
+from o3d_relief.bounds.crossings import cross, edges_of
 from o3d_relief.bounds.pairs import Pairs
 
 __all__ = ["silhouette_pairs", "silhouettes"]
@@ -19,9 +19,6 @@ _PIECE = 0.9
 
 _CLEAR = 1e-3
 """Edges cross in the picture where each reaches this far beyond the other, in relief units."""
-
-_APART = 5e-4
-"""Smallest gap in relief units: edges that touch are in no order."""
 
 _BLOCK = 16384
 """Edges that are worked on at once."""
@@ -47,7 +44,7 @@ def silhouettes(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDAr
     start, end, opposite = faces[:, _CORNERS].transpose(2, 0, 1).reshape(3, -1)
     low, high = np.minimum(start, end), np.maximum(start, end)
     plane = vertices[:, :2]
-    side = np.sign(_cross(plane[high] - plane[low], plane[opposite] - plane[low]))
+    side = np.sign(cross(plane[high] - plane[low], plane[opposite] - plane[low]))
     edge = low * len(vertices) + high
     order = np.argsort(edge, kind="stable")
     first = np.flatnonzero(np.diff(edge[order], prepend=-1))
@@ -96,18 +93,14 @@ def silhouette_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64]) ->
     ends, other_ends = vertices[edges[one], 2], vertices[edges[other], 2]
     height = ends[:, 0] * (1.0 - share) + ends[:, 1] * share
     other_height = other_ends[:, 0] * (1.0 - other_share) + other_ends[:, 1] * other_share
-    above = height > other_height
-    upper, upper_share = np.where(above, one, other), np.where(above, share, other_share)
-    lower, lower_share = np.where(above, other, one), np.where(above, other_share, share)
-    pairs = Pairs(
-        upper=edges[upper][:, [0, 1, 1]],
-        upper_weights=_weights(upper_share),
-        lower=edges[lower][:, [0, 1, 1]],
-        lower_weights=_weights(lower_share),
-        gap=np.abs(height - other_height),
+    pairs = Pairs.sorted_by(
+        height > other_height,
+        (edges[one][:, [0, 1, 1]], _weights(share)),
+        (edges[other][:, [0, 1, 1]], _weights(other_share)),
+        np.abs(height - other_height),
     )
     aligned = aligned_pairs(vertices, edges, prints, stacked)
-    return Pairs.join([pairs.select(pairs.gap > _APART), aligned])
+    return Pairs.join([pairs.select(pairs.gap > APART), aligned])
 
 
 def _in_one_cell(
@@ -215,7 +208,3 @@ def _sides(
 
 def _weights(share: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([1.0 - share, share, np.zeros_like(share)], axis=1)
-
-
-def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])

@@ -3,7 +3,8 @@ import pytest
 
 from o3d_relief.bounds.bounded import closest_relief, lowest_seen
 from o3d_relief.bounds.crossings import crossings, edges_of
-from o3d_relief.bounds.pairs import Pairs, grid_pairs, vertex_pairs
+from o3d_relief.bounds.grid import grid_pairs
+from o3d_relief.bounds.pairs import Pairs, vertex_pairs
 from o3d_relief.bounds.seen import face_weights, point_rows, seen_faces, seen_points
 from o3d_relief.linalg.laplacian import cotangent_laplacian
 from o3d_relief.stages.visibility import visible_vertices

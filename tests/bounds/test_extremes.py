@@ -3,7 +3,8 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from o3d_relief.bounds.extremes import extreme_pairs
-from o3d_relief.bounds.pairs import Pairs, grid_pairs
+from o3d_relief.bounds.grid import grid_pairs
+from o3d_relief.bounds.pairs import Pairs
 from shapes import bust, grid, joined, moved
 
 

@@ -1,8 +1,9 @@
 import pytest
 
+from o3d_relief.bounds.grid import grid_pairs
 from o3d_relief.bounds.inversions import inversions
 from o3d_relief.bounds.origin import Origin
-from o3d_relief.bounds.pairs import grid_pairs, vertex_pairs
+from o3d_relief.bounds.pairs import vertex_pairs
 from shapes import grid, joined, moved
 
 

@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 
 from o3d_relief import cotangent_laplacian
+from o3d_relief.bounds.grid import grid_pairs
 from o3d_relief.bounds.order import keep_order, out_of_order
-from o3d_relief.bounds.pairs import Pairs, grid_pairs, vertex_pairs
+from o3d_relief.bounds.pairs import Pairs, vertex_pairs
 from o3d_relief.linalg.laplacian import vertex_areas
 from shapes import grid, joined, moved
 

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from o3d_relief.bounds.pairs import close_pairs, grid_pairs, touching_pairs, vertex_pairs
+from o3d_relief.bounds.grid import grid_pairs
+from o3d_relief.bounds.pairs import close_pairs, vertex_pairs
 from shapes import bust, grid, joined, moved
 
 
@@ -38,27 +39,6 @@ def test_difference_is_linear_in_the_heights():
     assert pairs.difference(len(z)) @ vertices[:, 2] == pytest.approx(pairs.gap)
 
 
-def test_grid_pairs_join_neighbours_on_a_line_only():
-    vertices, faces = joined(grid(5), moved(grid(5), (0, 0, 4)), moved(grid(5), (0, 0, 20)))
-    pairs = grid_pairs(vertices, faces, side=32)
-    assert len(pairs) == 2 * 32 * 32
-    assert sorted(set(np.round(pairs.gap).astype(int))) == [4, 16]
-
-
-def test_touching_parts_are_found_whichever_way_they_lie():
-    base = grid(5, size=20)
-    parts = [moved(grid(3, size=4), (0, 0, 0.05)), moved(grid(3, size=4), (0, 0, 3))]
-    side = grid(3, size=4)[0][:, [2, 1, 0]] + [10.05, 0, 0], grid(3, size=4)[1]
-    vertices, faces = joined(base, *parts, side)
-    label = np.repeat([0, 1, 2, 3], [25, 9, 9, 9])
-    pairs = touching_pairs(vertices, faces, label, 0.1)
-    met = {
-        tuple(sorted(pair)) for pair in zip(label[pairs.upper[:, 0]], label[pairs.lower[:, 0]], strict=True)
-    }
-    assert met == {(0, 1), (0, 3)}
-    assert (pairs.gap <= 0.1).all()
-
-
 @pytest.mark.parametrize(("gap", "there"), [(8e-4, True), (3e-4, False), (3e-3, False)])
 def test_what_is_too_close_for_the_next_surface(gap, there):
     vertices, faces = joined(grid(9), moved(grid(5, size=33.3), (1.7, 0.9, gap)))
@@ -66,14 +46,3 @@ def test_what_is_too_close_for_the_next_surface(gap, there):
     assert (len(pairs) >= 25) == there  # every vertex of the smaller plate
     assert pairs.gap == pytest.approx(gap, abs=2e-5)
     assert (len(vertex_pairs(vertices, faces)) > 0) == (gap > 1e-3)
-
-
-def test_lines_of_the_grid_meet_steep_triangles_exactly():
-    """Rays in float32 miss a line by 1e-5 here, which a slope of 50 makes 5e-4 in z."""
-    vertices, faces = grid(9)
-    steep = np.column_stack([vertices[:, :2] + 1e3 / 7, 50.0 * vertices[:, 0]])
-    others, other_faces = grid(8)
-    above = np.column_stack([others[:, :2] + 1e3 / 7, 50.0 * others[:, 0] + 3.0])
-    pairs = grid_pairs(*joined((steep, faces), (above, other_faces)), side=37)
-    assert len(pairs) == 37 * 37
-    assert pairs.gap == pytest.approx(3.0, abs=1e-9)

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from o3d_relief.bounds.crossings import crossings, edges_of
+from o3d_relief.bounds.grid import grid_pairs
 from o3d_relief.bounds.origin import Origin
-from o3d_relief.bounds.pairs import grid_pairs, vertex_pairs
+from o3d_relief.bounds.pairs import vertex_pairs
 from o3d_relief.bounds.places import Place, crossing_places, few, gap_places, pair_places, told
 from shapes import grid, joined, moved
 

@@ -1,0 +1,87 @@
+"""Surfaces stacked on the lines of a regular grid."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o3d_relief.bounds.lines import UP, Borders, UnitBox, upright, weights_of
+from o3d_relief.bounds.pairs import Pairs, next_to_each_other
+
+__all__ = ["grid_pairs"]
+
+_NARROW = 0.01
+"""Change of weights up to which points are moved onto their lines."""
+
+
+def grid_pairs(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    *,
+    side: int = 1024,
+    low: NDArray[np.float64] | None = None,
+    high: NDArray[np.float64] | None = None,
+) -> Pairs:
+    """Pair the points that follow each other on the lines of a regular grid.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+        In the relief frame, in relief units.
+    faces : (m, 3) int64
+    side : int
+        Number of lines along x and along y.
+    low, high : (3,) float64, optional
+        Corners of the box that the grid covers, that of the vertices where omitted.
+
+    Returns
+    -------
+    Pairs
+        Neighbours on the surface, which meet where the line passes, are left out. The gap of surfaces that
+        touch is known to a rounding error only, and may be a little less than 0.
+    """
+    faces = faces[~upright(vertices, faces)]
+    if len(faces) == 0:
+        return Pairs.join([])
+    box = UnitBox(vertices, faces)
+    low = vertices.min(axis=0) if low is None else low
+    high = vertices.max(axis=0) if high is None else high
+    steps = (np.arange(side) + 0.5) / side
+    x, y = np.meshgrid(low[0] + steps * (high[0] - low[0]), low[1] + steps * (high[1] - low[1]))
+    start = np.stack(
+        [x.ravel(), y.ravel(), np.full(side * side, vertices[:, 2].min() - 0.01 * box.size)], axis=1
+    )
+    hits = box.scene.list_intersections(box.rays(start, UP))
+    triangle = hits["primitive_ids"].numpy().astype(np.int64)
+    weights = weights_of(hits["primitive_uvs"].numpy())
+    usable = np.flatnonzero(~Borders(vertices, faces).grazed(triangle, weights))
+    triangle, weights = triangle[usable], weights[usable]
+    line = hits["ray_ids"].numpy()[usable].astype(np.int64)
+    t = hits["t_hit"].numpy()[usable].astype(np.float64)
+    # One sort by line and height on it: t is well below the factor's size, and float64 has room for both.
+    order = np.argsort(line + t / (4.0 * max(float(t.max(initial=0.0)), 1.0)), kind="stable")
+    following = np.flatnonzero(line[order][1:] == line[order][:-1])
+    lower, upper = (
+        _on_line(vertices, faces[triangle[chosen]], weights[chosen], start[line[chosen], :2])
+        for chosen in (order[following], order[following + 1])
+    )
+    return next_to_each_other(vertices[:, 2], *upper, *lower)
+
+
+def _on_line(
+    vertices: NDArray[np.float64],
+    corners: NDArray[np.int64],
+    weights: NDArray[np.float64],
+    line: NDArray[np.float64],
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return points of triangles, (q, 3) corners and weights, put onto their lines (q, 2) exactly.
+
+    Rays in float32 miss them by a little, which is much in z where a triangle is steep. Of those that are so
+    narrow that the line passes beside them, the weights stay.
+    """
+    x, y = (np.ascontiguousarray(vertices[:, axis])[corners.T] - line[:, axis] for axis in (0, 1))
+    exact = np.stack([x[i - 2] * y[i - 1] - x[i - 1] * y[i - 2] for i in range(3)], axis=1)
+    area = exact.sum(axis=1, keepdims=True)
+    exact /= np.where(area == 0.0, 1.0, area)
+    beside = (area[:, 0] == 0.0) | (np.abs(exact - weights).max(axis=1) > _NARROW)
+    return corners, np.where(beside[:, None], weights, exact)
