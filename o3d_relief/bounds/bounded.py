@@ -152,6 +152,7 @@ def closest_relief(
         rows=sp.vstack([gap_rows(pairs, n), seen]).tocsr(),
         bound=np.concatenate([kept, np.zeros(seen.shape[0])]),
         more_rows=missed,
+        positions=vertices,
         tick=tick,
     )
     result = place(found.x)

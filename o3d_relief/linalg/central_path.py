@@ -39,7 +39,7 @@ class CentralPath:
 
     Parameters
     ----------
-    form, pull, origin, start, lower, upper, rows, bound, tick
+    form, pull, origin, start, lower, upper, rows, bound, tick, positions
         As for `minimise`.
 
     Attributes
@@ -63,6 +63,7 @@ class CentralPath:
         rows: sp.csr_array,
         bound: Vector,
         tick: Tick,
+        positions: NDArray[np.float64] | None = None,
     ) -> None:
         self.form, self.pull, self.origin = form, pull, origin
         self.x = self.start = start
@@ -74,7 +75,7 @@ class CentralPath:
         self.barrier = _FIRST_BARRIER * self.energy(start) / self._count()
         self.force = [self.barrier / slack for slack in self.slack]
         self.rounds = 0
-        self._solver, self._known = RoughSolver(tick), set[bytes]()
+        self._solver, self._known = RoughSolver(tick, positions), set[bytes]()
         self._active = rows[:0]
 
     def energy(self, x: Vector) -> float:

@@ -92,8 +92,8 @@ class Factor:
     Parameters
     ----------
     matrix : (n, n) sparse float64, CSR
-    positions : (n, 3) float64
-        Of the vertices that the unknowns belong to.
+    positions : (n, 3) float64 or None
+        Of the vertices that the unknowns belong to; None: the unknowns are ordered by minimum degree.
 
     Attributes
     ----------
@@ -106,12 +106,15 @@ class Factor:
         The matrix is singular.
     """
 
-    def __init__(self, matrix: sp.csr_array, positions: NDArray[np.float64]) -> None:
-        self.order, cut = nested_dissection(positions, matrix)
+    def __init__(self, matrix: sp.csr_array, positions: NDArray[np.float64] | None) -> None:
+        n = matrix.shape[0]
+        self.order, cut = np.arange(n), np.inf
+        if positions is not None:
+            self.order, cut = nested_dissection(positions, matrix)
         # Minimum degree is better where planes cut much, and slow on large fine surfaces, where they do not.
         by_planes = cut < _BADLY_CUT
         if not by_planes:
-            self.order = np.arange(len(positions))
+            self.order = np.arange(n)
         self.order.flags.writeable = False
         ordered = matrix[self.order][:, self.order].tocsc()
         try:
@@ -123,7 +126,7 @@ class Factor:
                     options={"SymmetricMode": True},
                 )
         except RuntimeError as error:  # SuperLU: exactly singular
-            raise SolverError(f"A linear system of {len(positions)} unknowns is singular.") from error
+            raise SolverError(f"A linear system of {n} unknowns is singular.") from error
 
     def solve(self, right_hand_side: NDArray[np.float64]) -> NDArray[np.float64]:
         """Solve for one right-hand side, (n,)."""

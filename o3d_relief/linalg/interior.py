@@ -64,6 +64,7 @@ def minimise(
     rows: sp.csr_array,
     bound: Vector,
     more_rows: MoreRows,
+    positions: NDArray[np.float64] | None = None,
     accuracy: float = 0.03,
     tick: Tick = silent,
 ) -> Minimum:
@@ -91,6 +92,8 @@ def minimise(
     more_rows : callable
         Given an x, returns further rows and bounds that `start` is strictly inside of, none when all is well.
         Asked now and then, and at the end: only an x with which all is well is returned, or `start`.
+    positions : (n, 3) float64, optional
+        Of the vertices that the unknowns belong to: factors of large meshes are then found faster.
     accuracy : float
         Gap between the objective and its dual, as a share of (x - o)' H (x - o) / 2, at which the iteration
         stops.
@@ -103,7 +106,7 @@ def minimise(
     Minimum
     """
     with threadpool_limits(limits=1):  # sums that do not depend on the number of threads
-        path = CentralPath(form, pull, origin, start, lower, upper, rows, bound, tick)
+        path = CentralPath(form, pull, origin, start, lower, upper, rows, bound, tick, positions)
         accepted, least = _run(path, accuracy, more_rows, tick)
     share = (path.objective(accepted) - least) / max(path.energy(accepted), 1e-300)
     return Minimum(x=accepted, rounds=path.rounds, watched=int(path.watched.sum()), gap=share)

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as sla
 from numpy.typing import NDArray
 
-from o3d_relief.errors import SolverError
+from o3d_relief.linalg.factor import Factor
 from o3d_relief.linalg.multigrid import Multigrid
 from o3d_relief.progress import Tick
 
@@ -35,10 +35,12 @@ class RoughSolver:
     ----------
     tick : callable
         Called in every step of the iteration; it may raise to end the work.
+    positions : (n, 3) float64 or None
+        See `Factor`.
     """
 
-    def __init__(self, tick: Tick) -> None:
-        self._tick = tick
+    def __init__(self, tick: Tick, positions: NDArray[np.float64] | None = None) -> None:
+        self._tick, self._positions = tick, positions
         self._directly = False
 
     def prepare(self, matrix: sp.csr_array) -> Solve:
@@ -55,7 +57,7 @@ class RoughSolver:
             (n,) to (n,) float64. It raises SolverError where the matrix is singular.
         """
         if self._directly or matrix.shape[0] <= _DIRECT_UP_TO:
-            return _factor(matrix)
+            return self._factor(matrix)
         cycle = Multigrid(matrix)
         preconditioner = sla.LinearOperator(matrix.shape, matvec=cycle, dtype=np.float64)
         factor: list[Solve] = []
@@ -74,21 +76,11 @@ class RoughSolver:
             )
             if failed:
                 self._directly = True
-                factor.append(_factor(matrix))
+                factor.append(self._factor(matrix))
                 return factor[0](right_hand_side)
             return np.asarray(solution, dtype=np.float64)
 
         return solve
 
-
-def _factor(matrix: sp.csr_array) -> Solve:
-    try:
-        factor = sla.splu(
-            matrix.tocsc(),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
-    except RuntimeError as error:  # SuperLU: exactly singular
-        raise SolverError(f"A linear system of {matrix.shape[0]} unknowns is singular.") from error
-    return lambda right_hand_side: np.asarray(factor.solve(right_hand_side), dtype=np.float64)
+    def _factor(self, matrix: sp.csr_array) -> Solve:
+        return Factor(matrix, self._positions).solve

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from o3d_relief.errors import SolverError
+from o3d_relief.linalg.factor import Factor
 from o3d_relief.linalg.multigrid import Multigrid, multigrid
 from o3d_relief.progress import Tick, silent
 
@@ -83,7 +84,7 @@ def solve_spd(
     left = np.inf
     with threadpool_limits(limits=1):
         if n <= direct_up_to:
-            solution = solve_direct(matrix, right_hand_side, definite=True)
+            solution = Factor(matrix, None).solve(right_hand_side)
         else:
             cycle = Multigrid(matrix if similar is None else similar)
             start = np.zeros(n) if start is None else start
@@ -102,17 +103,13 @@ def solve_spd(
     return np.asarray(solution, dtype=np.float64)
 
 
-def solve_direct(
-    matrix: sp.csr_array, right_hand_side: NDArray[np.float64], *, definite: bool = False
-) -> NDArray[np.float64]:
+def solve_direct(matrix: sp.csr_array, right_hand_side: NDArray[np.float64]) -> NDArray[np.float64]:
     """Solve A x = b for a sparse A of any condition, by an LU factorisation.
 
     Parameters
     ----------
     matrix : (n, n) sparse float64
     right_hand_side : (n,) float64
-    definite : bool
-        It is symmetric positive definite: no pivots have to be looked for, which is faster.
 
     Returns
     -------
@@ -126,8 +123,7 @@ def solve_direct(
     if len(right_hand_side) == 0:
         return np.zeros(0)
     try:
-        options = {"SymmetricMode": True, "DiagPivotThresh": 0.0} if definite else {}
-        factor = sla.splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", options=options)
+        factor = sla.splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A")
     except RuntimeError as error:  # SuperLU: exactly singular
         raise SolverError(f"A linear system of {len(right_hand_side)} unknowns is singular.") from error
     return np.asarray(factor.solve(right_hand_side), dtype=np.float64)
