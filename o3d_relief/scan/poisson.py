@@ -99,12 +99,11 @@ def poisson_surface(
     inside = (points - centre) / size
     if np.linalg.svd(np.linalg.qr(inside - inside.mean(axis=0), mode="r"), compute_uv=False)[1] < 1e-6:
         raise MeshError("The points lie on one line: they have no surface.")
-    apart = len(points) > _MANY or depth > _FINE
-    vertices, faces, density = (
-        reconstruct_apart(inside, normals, depth, threads, _MARGIN, tick)
-        if apart
-        else reconstruct(inside, normals, depth, threads, _MARGIN)
-    )
+    if len(points) > _MANY or depth > _FINE:
+        found = reconstruct_apart(inside, normals, depth, threads, _MARGIN, tick)
+    else:
+        found = reconstruct(inside, normals, depth, threads, _MARGIN)
+    vertices, faces, density = found
     if len(faces) == 0:
         raise MeshError("No surface could be laid through the points.")
     return vertices * size + centre, faces, density

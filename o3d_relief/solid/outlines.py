@@ -22,10 +22,11 @@ _LEAST_MM2 = 1e-6
 
 
 def once_covered(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Leave faces out until each place of the plate is covered once or not at all.
+    """Leave faces out so that each place of the plate is covered once or not at all.
 
     Seen along z, a face that turns to the viewer counts 1 and one that turns to the back -1. Where the sum is
-    neither 0 nor 1, outlines cross; there faces go that enter what is solid already, or leave air.
+    neither 0 nor 1, outlines cross; there faces go that enter what is solid already, or leave air. It ends
+    where there is no such place, none of its faces is to go, or after 40 rounds.
 
     Parameters
     ----------
