@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
+import secrets
 import shutil
-import tempfile
 from pathlib import Path
 
 from o3d_relief.errors import FileError
@@ -129,8 +129,21 @@ def write_files(path: str | Path, files: dict[str, bytes]) -> None:
 
 
 def _place(folder: Path, files: dict[str, bytes]) -> None:
+    # The name comes first: an interruption right after the folder is made must find it. It must not matter
+    # either when it comes in the middle of the clearing; hence twice.
+    work = folder / (_WORK + secrets.token_hex(4))
+    try:
+        try:
+            work.mkdir(mode=0o700)
+            _write_and_move(work, folder, files)
+        finally:
+            shutil.rmtree(work, ignore_errors=True)
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
+
+
+def _write_and_move(work: Path, folder: Path, files: dict[str, bytes]) -> None:
     main = list(files)[-1]
-    work = Path(tempfile.mkdtemp(prefix=_WORK, dir=folder))
     moved = []
     try:
         (work / "new").mkdir()
@@ -146,11 +159,10 @@ def _place(folder: Path, files: dict[str, bytes]) -> None:
                     (folder / name).replace(work / "old" / name)
             (work / "new" / name).replace(folder / name)
     except BaseException:
-        for name in moved:
+        # Once the main file is in its place, so are all.
+        for name in moved if (work / "new" / main).exists() else []:
             if (work / "old" / name).exists():
                 (work / "old" / name).replace(folder / name)
             elif not (work / "new" / name).exists():
                 (folder / name).unlink()
         raise
-    finally:
-        shutil.rmtree(work, ignore_errors=True)

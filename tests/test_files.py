@@ -10,9 +10,10 @@ from pathlib import Path
 import open3d as o3d
 import pytest
 
+from o3d_relief import files as files_module
 from o3d_relief.cli import main
 from o3d_relief.errors import FileError
-from o3d_relief.files import check_exists, check_place, write_bytes
+from o3d_relief.files import check_exists, check_place, write_bytes, write_files
 from shapes import bust, to_mesh
 
 POSIX = pytest.mark.skipif(os.name != "posix", reason="signals and limits of POSIX")
@@ -69,6 +70,49 @@ class TestPlaces:
         with pytest.raises(FileError, match="read-only"):
             write_bytes(path, b"other")
         assert path.read_text() == "precious"
+
+
+OLD = {"m.mtl": b"old", "m.obj": b"old"}
+NEW = {"m.png": b"new", "m.mtl": b"new", "m.obj": b"new"}
+
+
+class TestInterruption:
+    def interrupted(self, folder, line):
+        """Write over old files; be interrupted before the given line. Return whether there were so many."""
+        folder.mkdir()
+        for name, content in OLD.items():
+            (folder / name).write_bytes(content)
+        passed = 0
+
+        def trace(frame, event, _argument):
+            nonlocal passed
+            if frame.f_code.co_filename != files_module.__file__:
+                return None
+            passed += event == "line"
+            if passed == line:
+                sys.settrace(None)
+                raise KeyboardInterrupt
+            return trace
+
+        before = sys.gettrace()
+        sys.settrace(trace)
+        try:
+            write_files(folder / "m.obj", NEW)
+        except KeyboardInterrupt:
+            return True
+        finally:
+            sys.settrace(before)
+        return False
+
+    def test_at_every_line_leaves_all_old_or_all_new(self, tmp_path):
+        seen, line = [], 1
+        while self.interrupted(tmp_path / str(line), line):
+            seen.append({path.name: path.read_bytes() for path in (tmp_path / str(line)).iterdir()})
+            line += 1
+        assert line > 30
+        assert all(state in (OLD, NEW) for state in seen)
+        assert OLD in seen
+        assert NEW in seen
 
 
 @POSIX
