@@ -24,9 +24,10 @@ if TYPE_CHECKING:
     from o3d_relief.measure import ReliefQuality, Yardstick, measure_relief
     from o3d_relief.params import ReliefParams, View
     from o3d_relief.params_file import load_params, save_params
-    from o3d_relief.pipeline import Relief, make_relief
+    from o3d_relief.pipeline import make_relief
     from o3d_relief.plate_params import PlateParams
     from o3d_relief.point_edits import PointEdit
+    from o3d_relief.relief import Relief
     from o3d_relief.scan_params import ScanParams
     from o3d_relief.scene.demo import demo_scene
     from o3d_relief.scene.read import read_mesh, read_points
@@ -125,7 +126,7 @@ _HOME = {
     "PointEdit": "point_edits",
     "load_params": "params_file",
     "save_params": "params_file",
-    "Relief": "pipeline",
+    "Relief": "relief",
     "PlateParams": "plate_params",
     "Solid": "solid.body",
     "SolidReport": "solid.checks",

@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from o3d_relief.arguments import chosen_params, chosen_view
 from o3d_relief.batch_manifest import MANIFEST
 from o3d_relief.console import tell
+from o3d_relief.relief_arguments import chosen_params, chosen_view
 from o3d_relief.scan_arguments import chosen_scan
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ from o3d_relief.files import write_bytes
 
 if TYPE_CHECKING:
     from o3d_relief.making import Made
-    from o3d_relief.pipeline import Relief
     from o3d_relief.records import StageRecord
+    from o3d_relief.relief import Relief
 
 __all__ = ["make_folder", "tell", "tell_result", "tell_stage", "write_report", "write_stages"]
 

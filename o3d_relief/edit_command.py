@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 
-from o3d_relief.arguments import chosen_params, chosen_view
 from o3d_relief.console import tell, tell_stage
 from o3d_relief.errors import MeshError
 from o3d_relief.files import check_exists
 from o3d_relief.make_command import read_scene
 from o3d_relief.params import ReliefParams, View
+from o3d_relief.relief_arguments import chosen_params, chosen_view
 from o3d_relief.scan_arguments import chosen_scan
 from o3d_relief.show.display import require_display, require_vulkan
 

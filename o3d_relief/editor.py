@@ -16,10 +16,11 @@ from o3d_relief.journal import OnStage
 from o3d_relief.live_scene import LivePoints, LiveScene
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.params_file import load_params, save_params
-from o3d_relief.pipeline import Relief, make_relief
+from o3d_relief.pipeline import make_relief
 from o3d_relief.point_edits import PointEdit, merged
 from o3d_relief.progress import OnProgress, Progress
 from o3d_relief.records import AttenuationStage
+from o3d_relief.relief import Relief
 
 __all__ = ["EditorPoints", "ReliefEditor"]
 

@@ -8,11 +8,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from o3d_relief.arguments import chosen_params, chosen_plate, chosen_view
 from o3d_relief.console import tell, tell_result, tell_stage, write_report, write_stages
 from o3d_relief.errors import FileError, MeshError, ParameterError, ReliefError
 from o3d_relief.files import check_exists, check_place
+from o3d_relief.plate_arguments import chosen_plate
 from o3d_relief.plate_params import PlateParams
+from o3d_relief.relief_arguments import chosen_params, chosen_view
 from o3d_relief.scan_arguments import chosen_scan
 from o3d_relief.scan_params import ScanParams
 from o3d_relief.workshop_arguments import check_workshop, chosen_mill, chosen_tiles
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from open3d.geometry import PointCloud, TriangleMesh
 
     from o3d_relief.making import Made
-    from o3d_relief.pipeline import Relief
+    from o3d_relief.relief import Relief
 
 __all__ = ["make", "read_scene"]
 

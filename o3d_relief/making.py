@@ -12,9 +12,9 @@ import open3d as o3d
 from numpy.typing import NDArray
 
 from o3d_relief.params import ReliefParams, View
-from o3d_relief.pipeline import Relief
 from o3d_relief.plate_params import PlateParams
 from o3d_relief.progress import OnProgress, Progress
+from o3d_relief.relief import Relief
 from o3d_relief.solid.body import Solid
 from o3d_relief.solid.checks import SolidReport, check_solid
 from o3d_relief.solid.estimate import estimate_solid

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
 
+from o3d_relief.relief_arguments import point
 from o3d_relief.scan_params import ScanParams
 
 __all__ = ["add_scan", "chosen_scan"]
 
 
-def add_scan(command: argparse.ArgumentParser, point: Callable[[str], tuple[float, ...]]) -> None:
+def add_scan(command: argparse.ArgumentParser) -> None:
     """Add the options for point clouds.
 
     Parameters
     ----------
     command : argparse.ArgumentParser
-    point : callable
-        Understands three numbers.
     """
     default = ScanParams()
     add = command.add_argument_group("point clouds", "lengths are in spacings of the points").add_argument

@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from o3d_relief.arguments import chosen_params, chosen_view
 from o3d_relief.console import tell, tell_stage
 from o3d_relief.errors import Cancelled, MeshError
 from o3d_relief.files import check_exists
 from o3d_relief.make_command import read_scene
+from o3d_relief.relief_arguments import chosen_params, chosen_view
 from o3d_relief.scan_arguments import chosen_scan
 from o3d_relief.show.display import require_display
 

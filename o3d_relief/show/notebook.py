@@ -12,7 +12,7 @@ from o3d_relief.scene.convert import arrays_mesh
 from o3d_relief.show.sheets import view_sheet
 
 if TYPE_CHECKING:
-    from o3d_relief.pipeline import Relief
+    from o3d_relief.relief import Relief
 
 __all__ = ["relief_png"]
 

@@ -21,7 +21,7 @@ from o3d_relief.records import (
 )
 
 if TYPE_CHECKING:
-    from o3d_relief.pipeline import Relief
+    from o3d_relief.relief import Relief
 
 __all__ = ["CutRelief", "StageSurfaces"]
 

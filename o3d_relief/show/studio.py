@@ -24,7 +24,7 @@ from o3d_relief.show.sight import Sight, Work
 if TYPE_CHECKING:
     import open3d as o3d
 
-    from o3d_relief.pipeline import Relief
+    from o3d_relief.relief import Relief
 
 __all__ = ["Act", "Studio"]
 

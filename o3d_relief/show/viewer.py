@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from o3d_relief.errors import DisplayError, ParameterError
 from o3d_relief.params import View
-from o3d_relief.pipeline import Relief
 from o3d_relief.records import StageRecord
+from o3d_relief.relief import Relief
 from o3d_relief.show.display import require_display
 from o3d_relief.show.mesh_colors import vertex_colors
 from o3d_relief.show.messages import Done, Opening

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o3d_relief.errors import MeshError, ParameterError
-from o3d_relief.pipeline import Relief
 from o3d_relief.plate_params import PlateParams
 from o3d_relief.progress import OnProgress, Progress, Tick, silent
+from o3d_relief.relief import Relief
 from o3d_relief.scene.arrays import MeshArrays, from_open3d
 from o3d_relief.solid.bodies import joined
 from o3d_relief.solid.body import Solid, manifold_of
