@@ -16,6 +16,7 @@ from o3d_relief.console import make_folder, tell, tell_result, tell_stage, write
 from o3d_relief.edit_command import edit
 from o3d_relief.errors import ReliefError
 from o3d_relief.make_command import make
+from o3d_relief.option_words import as_options
 from o3d_relief.params import ReliefParams
 from o3d_relief.view_command import view
 
@@ -38,6 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
     signals: list[int] = []
+    options = argparse.Namespace()
 
     def stop(number: int, _frame: object) -> None:
         signals.append(number)
@@ -50,7 +52,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         commands = {"make": make, "batch": batch, "demo": _demo, "view": view, "edit": edit}
         return commands[options.command](options)
     except ReliefError as error:
-        tell(f"o3d-relief: error: {error}")
+        tell(f"o3d-relief: error: {as_options(str(error), vars(options))}")
         return 2
     except MemoryError:
         tell("o3d-relief: error: the memory is used up: reduce the mesh, or use a machine with more memory.")

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import re
 
+from o3d_relief.errors import ParameterError
 from o3d_relief.relief_arguments import point
 from o3d_relief.scan_params import ScanParams
 
@@ -51,15 +53,19 @@ def chosen_scan(options: argparse.Namespace) -> ScanParams:
     ParameterError
         A value out of its range.
     """
-    return ScanParams(
-        sensor=options.sensor,
-        remove_ground=options.remove_ground,
-        file_normals=options.file_normals,
-        depth=options.scan_depth,
-        max_points=options.max_points,
-        outliers=None if options.outliers == 0.0 else options.outliers,
-        max_hole=options.max_hole,
-        min_part=options.min_part,
-        threads=options.scan_threads,
-        seed=options.seed,
-    )
+    try:
+        return ScanParams(
+            sensor=options.sensor,
+            remove_ground=options.remove_ground,
+            file_normals=options.file_normals,
+            depth=options.scan_depth,
+            max_points=options.max_points,
+            outliers=None if options.outliers == 0.0 else options.outliers,
+            max_hole=options.max_hole,
+            min_part=options.min_part,
+            threads=options.scan_threads,
+            seed=options.seed,
+        )
+    except ParameterError as error:
+        # Two options have longer names than their parameters, since a relief has a depth as well.
+        raise ParameterError(re.sub("^(depth|threads) ", r"scan_\1 ", str(error))) from error

@@ -192,7 +192,7 @@ def test_what_is_left_out_is_said(tmp_path, scene, capsys):
 def test_larger_than_accepted(tmp_path, scene, capsys):
     words = ["make", scene, tmp_path / "r.ply", "--max-triangles", "100"]
     assert "triangles, more than the 100 that are accepted" in _fails(capsys, *words)
-    assert "max_triangles must be a whole number" in _fails(capsys, *words[:-1], "0")
+    assert "--max-triangles must be a whole number" in _fails(capsys, *words[:-1], "0")
     assert _files(tmp_path) == ["scene.ply"]
 
 
@@ -334,10 +334,12 @@ def test_outliers_zero_keeps_all():
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["-k", "0"], "k must be at least 1"),
+        (["-k", "0"], "-k must be at least 1"),
+        (["--min-gap", "1", "--no-in-order"], "--min-gap needs --in-order"),
         (["-k", "999999"], "k must be at most the number of vertices"),
-        (["--alpha", "0.5", "--depth", "3"], "exclude each other"),
-        (["--mode", "bounded"], "needs a depth"),
+        (["--alpha", "0.5", "--depth", "3"], "--alpha and --depth exclude each other"),
+        (["--mode", "bounded"], "--mode bounded needs a depth"),
+        (["--scan-depth", "40"], "--scan-depth must be between 3 and 13"),
         (["--depth", "3", "--attach", "99999999"], "attach must be numbers of the mesh's"),
         (["--front", "y"], "parallel"),
         (["--viewpoint", "0,0,3"], "in front of the scene"),
@@ -472,8 +474,8 @@ def test_a_search_that_does_not_come_to_its_end_is_told(tmp_path, scene, capsys,
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["--width-mm", "0"], "width_mm must be greater than 0"),
-        (["--width-mm", "90", "--depth-mm", "4"], "base_mm must be less than depth_mm, 4"),
+        (["--width-mm", "0"], "--width-mm must be greater than 0"),
+        (["--width-mm", "90", "--depth-mm", "4"], "--base-mm must be less than --depth-mm, 4"),
         (["--depth-mm", "20", "--depth", "3"], "--depth-mm and --depth exclude each other"),
         (["--depth-mm", "20", "--alpha", "0.5"], "--depth-mm and --alpha exclude each other"),
         (["--walls", "missing/w.png"], "folder missing is missing"),
