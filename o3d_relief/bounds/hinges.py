@@ -1,0 +1,67 @@
+"""Surfaces that changed places behind S, but hang together in front of it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o3d_relief.bounds.origin import Origin
+from o3d_relief.bounds.pairs import Pairs
+
+__all__ = ["hinged_in_front"]
+
+
+def hinged_in_front(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], pairs: Pairs, z: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Tell which pairs belong to triangles with a common vertex in front of S.
+
+    From that vertex, where they meet, to the line of the pair the gap of the two triangles is linear: if they
+    changed places on that line, behind S, they did so from the vertex on, in front of S.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+    faces : (m, 3) int64
+    pairs : Pairs
+        Of points behind S.
+    z : (n,) float64
+        Heights now.
+
+    Returns
+    -------
+    (p,) bool
+
+    Examples
+    --------
+    Two triangles with a common corner, and a corner of the one above the middle of the other:
+
+    >>> places = np.array([[0, 0, 0], [4, 0, 2], [4, 4, 2], [3, 1, 4], [0, 4, 1.0]])
+    >>> corner, middle = np.array([[1.0, 0, 0]]), np.array([[0.25, 0.5, 0.25]])
+    >>> pair = Pairs(
+    ...     upper=np.array([[3, 3, 3]]), upper_weights=corner,
+    ...     lower=np.array([[0, 1, 2]]), lower_weights=middle, gap=np.array([2.5]),
+    ... )
+    >>> turned = np.array([1.0, -1.0, -1.0, -4.0, -1.0])
+    >>> hinged_in_front(places, np.array([[0, 1, 2], [0, 3, 4]]), pair, turned).tolist()
+    [True]
+    """
+    front = z > 0.0
+    in_front = front[faces]
+    cut = faces[in_front.any(axis=1) & ~in_front.all(axis=1)]
+    beside = np.zeros(len(z), dtype=bool)
+    beside[cut] = True
+    hinged = beside[pairs.upper].all(axis=1) & beside[pairs.lower].all(axis=1)
+    few = np.flatnonzero(hinged)
+    if len(few):
+        chosen = pairs.select(few)
+        one = _holding(chosen.upper, chosen.upper_weights)
+        other = _holding(chosen.lower, chosen.lower_weights)
+        hinged[few] = Origin(cut, cut, vertices).meet(one, other, among=front)
+    return hinged
+
+
+def _holding(corners: NDArray[np.int64], weights: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Write points as the corners that hold them, (p, 3): those without weight are others, again."""
+    heaviest = np.take_along_axis(corners, weights.argmax(axis=1)[:, None], axis=1)
+    return np.where(weights == 0.0, heaviest, corners)
