@@ -13,6 +13,7 @@ from o3d_relief.bounds.crossings import edges_of, new_crossings
 from o3d_relief.bounds.cuts import cut_crossings, narrow
 from o3d_relief.bounds.hinges import hinged_in_front
 from o3d_relief.bounds.pairs import Pairs, foot_pairs
+from o3d_relief.bounds.parted import Parted
 from o3d_relief.bounds.raster import Raster
 from o3d_relief.progress import Tick, share_of_way, silent
 
@@ -142,7 +143,7 @@ def keep_order(
     """
     front = np.zeros(len(z), dtype=bool) if in_front is None else in_front
     system = Correction(vertices, laplacian, areas, z)
-    lines, between = _Lines(vertices, faces, pairs, min_gap), _BetweenLines(vertices, faces)
+    lines, between = _Lines(vertices, faces, pairs, min_gap), _BetweenLines(vertices, faces, laplacian)
     further, floor = Pairs.join([]), np.zeros(len(z), dtype=bool)
     current, best, fewest, rounds, first = z, z, np.inf, 0, 0
     while True:
@@ -154,6 +155,9 @@ def keep_order(
             found, count = between.look_at(current)
             found = found.select(np.subtract(*found.heights(current)) < required_gaps(found, min_gap))
             left += count
+            if left == 0:
+                found = between.parted(current)
+                left = len(found)
             if left < fewest:
                 best, fewest = current, left
         first = first or left
@@ -180,9 +184,12 @@ def keep_order(
 class _BetweenLines:
     """Looks for edges that have begun to pierce triangles, and for what changed places where S cuts it."""
 
-    def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
+    def __init__(
+        self, vertices: NDArray[np.float64], faces: NDArray[np.int64], laplacian: sp.csr_array
+    ) -> None:
         self._vertices, self._faces = vertices, faces
         self._edges, self._raster = edges_of(faces), Raster(vertices, faces)
+        self._parted = Parted(vertices, faces, laplacian, self._raster)
         self._last = np.full(len(vertices), np.nan)
 
     def look_at(self, z: NDArray[np.float64]) -> tuple[Pairs, int]:
@@ -208,6 +215,11 @@ class _BetweenLines:
         looked.append(cut_crossings(vertices, faces[beside_cut], standing, z))
         found = Pairs.join([*(pairs for pairs, _ in looked), at_foot])
         return found, sum(count for _, count in looked) + len(at_foot)
+
+    def parted(self, z: NDArray[np.float64]) -> Pairs:
+        """Return pairs that changed places beside a crossing of the scene that is gone."""
+        pairs = self._parted.look_at(z)
+        return pairs.select(out_of_order(pairs, z))
 
 
 class _Lines:
