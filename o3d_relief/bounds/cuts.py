@@ -1,4 +1,4 @@
-"""Edges that the trim makes across triangles which stand upright."""
+"""Edges that the trim makes across triangles that stand upright."""
 
 from __future__ import annotations
 
@@ -7,35 +7,18 @@ from numpy.typing import NDArray
 
 from o3d_relief.bounds.crossings import cross, new_crossings
 from o3d_relief.bounds.pairs import Pairs
+from o3d_relief.bounds.raster import Raster
 
-__all__ = ["cut_crossings", "narrow"]
+__all__ = ["cut_crossings"]
 
 _NARROW = 2e-3
-"""Width in the picture, in relief units, below which edges that pierce a triangle go unseen: it counts as upright."""
-
-
-def narrow(plane: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Find the triangles that are lines in the picture.
-
-    Parameters
-    ----------
-    plane : (n, 2) float64
-        In relief units.
-    faces : (m, 3) int64
-
-    Returns
-    -------
-    (m,) bool
-    """
-    a, b, c = plane[faces].transpose(1, 0, 2)
-    longest = np.max([np.abs(side).max(axis=1) for side in (b - a, c - b, a - c)], axis=0)
-    return np.asarray(np.abs(cross(b - a, c - a)) <= _NARROW * longest)
+"""Width in the picture, in relief units, below which nothing is seen to pierce a triangle."""
 
 
 def cut_crossings(
     vertices: NDArray[np.float64],
     faces: NDArray[np.int64],
-    standing: NDArray[np.int64],
+    raster: Raster,
     z: NDArray[np.float64],
 ) -> tuple[Pairs, int]:
     """Find where the new edges of trimmed triangles would pierce others, and did not before.
@@ -49,9 +32,8 @@ def cut_crossings(
     vertices : (n, 3) float64
         Before.
     faces : (m, 3) int64
-        What they may pierce.
-    standing : (q, 3) int64
-        Triangles that S cuts.
+    raster : Raster
+        Of the faces.
     z : (n,) float64
         Heights now.
 
@@ -62,22 +44,34 @@ def cut_crossings(
     count : int
         Number of crossings.
     """
-    standing = standing[((z[standing] > 0.0).sum(axis=1) == 2) & (z[standing].min(axis=1) < 0.0)]
-    if len(standing) == 0 or len(faces) == 0:
+    heights = z[faces]
+    cut = np.flatnonzero(((heights > 0.0).sum(axis=1) == 2) & (heights.min(axis=1) < 0.0))
+    cut = cut[_narrow(vertices[:, :2], faces[cut])]
+    if len(cut) == 0:
         return Pairs.join([]), 0
+    changed = np.zeros(len(faces), dtype=bool)
+    changed[cut] = True
+    standing, faces = faces[cut], faces[raster.over_or_under(changed)]
     # From the highest corner to where S cuts the side opposite to it, the lower of two of one height first.
     back, front, tip = np.take_along_axis(standing, np.lexsort((-standing, z[standing]), axis=1), axis=1).T
     n = len(vertices)
     share = z[front] / (z[front] - z[back])
     foot = vertices[front] + share[:, None] * (vertices[back] - vertices[front])
     diagonals = np.stack([tip, n + np.arange(len(tip))], axis=1)
-    heights = np.append(z, np.zeros(len(tip)))
-    pairs, count = new_crossings(np.concatenate([vertices, foot]), faces, diagonals, heights)
+    moved = np.append(z, np.zeros(len(tip)))
+    pairs, count = new_crossings(np.concatenate([vertices, foot]), faces, diagonals, moved)
     upper = _on_triangles(pairs.upper, pairs.upper_weights, front, back, share, n)
     lower = _on_triangles(pairs.lower, pairs.lower_weights, front, back, share, n)
     return Pairs(
         upper=upper[0], upper_weights=upper[1], lower=lower[0], lower_weights=lower[1], gap=pairs.gap
     ), count
+
+
+def _narrow(plane: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Find the triangles that are lines in the picture."""
+    a, b, c = plane[faces].transpose(1, 0, 2)
+    longest = np.max([np.abs(side).max(axis=1) for side in (b - a, c - b, a - c)], axis=0)
+    return np.asarray(np.abs(cross(b - a, c - a)) <= _NARROW * longest)
 
 
 def _on_triangles(

@@ -8,13 +8,16 @@ from numpy.typing import NDArray
 from o3d_relief.bounds.origin import Origin
 from o3d_relief.bounds.pairs import Pairs
 
-__all__ = ["hinged_in_front"]
+__all__ = ["hinged_pairs"]
+
+_EXACT = 1e-4
+"""Relief units by which a gap may be below 0."""
 
 
-def hinged_in_front(
+def hinged_pairs(
     vertices: NDArray[np.float64], faces: NDArray[np.int64], pairs: Pairs, z: NDArray[np.float64]
-) -> NDArray[np.bool_]:
-    """Tell which pairs belong to triangles with a common vertex in front of S.
+) -> Pairs:
+    """Choose the pairs out of order behind S whose triangles have a common vertex in front of it.
 
     From that vertex, where they meet, to the line of the pair the gap of the two triangles is linear: if they
     changed places on that line, behind S, they did so from the vertex on, in front of S.
@@ -24,13 +27,12 @@ def hinged_in_front(
     vertices : (n, 3) float64
     faces : (m, 3) int64
     pairs : Pairs
-        Of points behind S.
     z : (n,) float64
         Heights now.
 
     Returns
     -------
-    (p,) bool
+    Pairs
 
     Examples
     --------
@@ -43,22 +45,20 @@ def hinged_in_front(
     ...     lower=np.array([[0, 1, 2]]), lower_weights=middle, gap=np.array([2.5]),
     ... )
     >>> turned = np.array([1.0, -1.0, -1.0, -4.0, -1.0])
-    >>> hinged_in_front(places, np.array([[0, 1, 2], [0, 3, 4]]), pair, turned).tolist()
-    [True]
+    >>> len(hinged_pairs(places, np.array([[0, 1, 2], [0, 3, 4]]), pair, turned))
+    1
     """
     front = z > 0.0
     in_front = front[faces]
     cut = faces[in_front.any(axis=1) & ~in_front.all(axis=1)]
     beside = np.zeros(len(z), dtype=bool)
     beside[cut] = True
-    hinged = beside[pairs.upper].all(axis=1) & beside[pairs.lower].all(axis=1)
-    few = np.flatnonzero(hinged)
-    if len(few):
-        chosen = pairs.select(few)
-        one = _holding(chosen.upper, chosen.upper_weights)
-        other = _holding(chosen.lower, chosen.lower_weights)
-        hinged[few] = Origin(cut, cut, vertices).meet(one, other, among=front)
-    return hinged
+    chosen = pairs.select(np.flatnonzero(beside[pairs.upper].all(axis=1) & beside[pairs.lower].all(axis=1)))
+    upper, lower = chosen.heights(z)
+    chosen = chosen.select((upper - lower < -_EXACT) & (lower <= 0.0))
+    one = _holding(chosen.upper, chosen.upper_weights)
+    other = _holding(chosen.lower, chosen.lower_weights)
+    return chosen.select(Origin(cut, cut, vertices).meet(one, other, among=front))
 
 
 def _holding(corners: NDArray[np.int64], weights: NDArray[np.float64]) -> NDArray[np.int64]:

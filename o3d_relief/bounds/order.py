@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from o3d_relief.bounds.correction import Correction
 from o3d_relief.bounds.crossings import edges_of, new_crossings
-from o3d_relief.bounds.cuts import cut_crossings, narrow
-from o3d_relief.bounds.hinges import hinged_in_front
+from o3d_relief.bounds.cuts import cut_crossings
+from o3d_relief.bounds.hinges import hinged_pairs
 from o3d_relief.bounds.pairs import Pairs, foot_pairs
 from o3d_relief.bounds.parted import Parted
 from o3d_relief.bounds.raster import Raster
@@ -35,6 +35,9 @@ _ROUNDS = 40
 
 _FEW = 3000
 """Pairs out of order on lines up to which edges that pierce triangles are looked for at the same time."""
+
+_HARDLY_ANY = 200
+"""What is out of order, on lines and between them, up to which what is rare is looked for, too."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -79,17 +82,9 @@ def out_of_order(pairs: Pairs, z: NDArray[np.float64], *, min_gap: float = 0.0) 
     (p,) bool
         Pairs of which both points lie behind S, where they are cut off, do not count.
     """
-    missed, in_front = _missed(pairs, z, min_gap)
-    return missed & in_front
-
-
-def _missed(
-    pairs: Pairs, z: NDArray[np.float64], min_gap: float
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return which pairs are out of order or too close, and which have a point in front of S, (p,) each."""
     upper, lower = pairs.heights(z)
     missed = upper - lower < required_gaps(pairs, min_gap) - _EXACT
-    return missed, np.maximum(upper, lower) > 0.0
+    return missed & (np.maximum(upper, lower) > 0.0)
 
 
 def keep_order(
@@ -143,7 +138,7 @@ def keep_order(
     """
     front = np.zeros(len(z), dtype=bool) if in_front is None else in_front
     system = Correction(vertices, laplacian, areas, z)
-    lines, between = _Lines(vertices, faces, pairs, min_gap), _BetweenLines(vertices, faces, laplacian)
+    lines, between = _Lines(pairs, len(z), min_gap), _BetweenLines(vertices, faces, laplacian)
     further, floor = Pairs.join([]), np.zeros(len(z), dtype=bool)
     current, best, fewest, rounds, first = z, z, np.inf, 0, 0
     while True:
@@ -153,11 +148,11 @@ def keep_order(
         # What crosses is mostly out of order on a line as well: while there is much of it, lines will do.
         if left <= _FEW or rounds == _ROUNDS:
             found, count = between.look_at(current)
-            found = found.select(np.subtract(*found.heights(current)) < required_gaps(found, min_gap))
             left += count
-            if left == 0:
-                found = between.parted(current)
-                left = len(found)
+            if left <= _HARDLY_ANY:
+                rare, count = between.look_closer(current, pairs)
+                found, left = Pairs.join([found, rare]), left + count
+            found = found.select(np.subtract(*found.heights(current)) < required_gaps(found, min_gap))
             if left < fewest:
                 best, fewest = current, left
         first = first or left
@@ -207,33 +202,28 @@ class _BetweenLines:
         looked = [new_crossings(vertices, faces[near], edges[own], z)]
         if not own.all():
             looked.append(new_crossings(vertices, faces[changed], edges[~own], z))
-        cut = near & (z[faces].min(axis=1) < 0.0) & (z[faces].max(axis=1) > 0.0)
-        beside_cut = near & self._raster.over_or_under(cut)
-        at_foot = foot_pairs(vertices, faces[beside_cut], edges, z)
-        standing = faces[cut]
-        standing = standing[narrow(vertices[:, :2], standing)]
-        looked.append(cut_crossings(vertices, faces[beside_cut], standing, z))
+        cut = (z[faces].min(axis=1) < 0.0) & (z[faces].max(axis=1) > 0.0)
+        at_foot = foot_pairs(vertices, faces[near & self._raster.over_or_under(cut & near)], edges, z)
         found = Pairs.join([*(pairs for pairs, _ in looked), at_foot])
         return found, sum(count for _, count in looked) + len(at_foot)
 
-    def parted(self, z: NDArray[np.float64]) -> Pairs:
-        """Return pairs that changed places beside a crossing of the scene that is gone."""
-        pairs = self._parted.look_at(z)
-        return pairs.select(out_of_order(pairs, z))
+    def look_closer(self, z: NDArray[np.float64], pairs: Pairs) -> tuple[Pairs, int]:
+        """Return pairs for what is rare: it hangs together over S, stands at the cut, or crossed before."""
+        hinged = hinged_pairs(self._vertices, self._faces, pairs, z)
+        parted = self._parted.look_at(z)
+        parted = parted.select(out_of_order(parted, z))
+        cut, count = cut_crossings(self._vertices, self._faces, self._raster, z)
+        return Pairs.join([hinged, parted, cut]), len(hinged) + len(parted) + count
 
 
 class _Lines:
     """The pairs on lines that are known beforehand: which are wrong, and which are held."""
 
-    def __init__(
-        self, vertices: NDArray[np.float64], faces: NDArray[np.int64], pairs: Pairs, min_gap: float
-    ) -> None:
-        self._vertices, self._faces = vertices, faces
+    def __init__(self, pairs: Pairs, n: int, min_gap: float) -> None:
         self._pairs, self._min_gap = pairs, min_gap
         self._held = np.zeros(len(pairs), dtype=bool)
-        self._behind = self._held.copy()
         self._ever, self._again = self._held.copy(), self._held.copy()
-        self._last = np.full(len(vertices), np.nan)
+        self._last = np.full(n, np.nan)
         self.wrong = np.zeros(len(pairs), dtype=bool)
 
     @property
@@ -245,14 +235,7 @@ class _Lines:
         moved = z != self._last
         self._last = z
         changed = np.flatnonzero(moved[self._pairs.upper].any(axis=1) | moved[self._pairs.lower].any(axis=1))
-        missed, in_front = _missed(self._pairs.select(changed), z, self._min_gap)
-        self.wrong[changed] = missed & in_front
-        self._behind[changed] = missed & ~in_front
-        behind = np.flatnonzero(self._behind)
-        pairs = self._pairs.select(behind)
-        turned = np.subtract(*pairs.heights(z)) < -_EXACT
-        behind = behind[turned]
-        self.wrong[behind] = hinged_in_front(self._vertices, self._faces, pairs.select(turned), z)
+        self.wrong[changed] = out_of_order(self._pairs.select(changed), z, min_gap=self._min_gap)
 
     def let_go(self, z: NDArray[np.float64]) -> None:
         """Hold no longer what has room to spare."""

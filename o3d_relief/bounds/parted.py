@@ -18,7 +18,7 @@ _APART = 1e-3
 
 
 class Parted:
-    """Looks for triangles that changed places right beside a crossing of parts of the scene that is gone.
+    """Looks beside crossings of the parts of a scene that are gone, where triangles may have changed places.
 
     A part of the picture in which two surfaces have changed places may end where they crossed in the scene.
     Where they cross no longer, all of it lies within triangles, and neither vertices nor silhouettes nor
@@ -45,19 +45,30 @@ class Parted:
         self._vertices, self._faces = vertices, faces
         self._laplacian, self._raster = laplacian, raster
         self._old: Crossings | None = None
+        self._last = np.full(len(vertices), np.nan)
 
     def look_at(self, z: NDArray[np.float64]) -> Pairs:
-        """Return pairs, in the order of the scene, of what lies the other way round for the heights z (n,)."""
+        """Return what lies right beside crossings that are gone for the heights z (n,).
+
+        Upper and lower as they were in the scene; only where something has moved since the last call.
+        """
         if self._old is None:
             self._old = self._between_parts()
-        before = self._vertices[:, 2]
-        in_front = (z[self._old.face].max(axis=1) > 0.0) & (z[self._old.edge].max(axis=1) > 0.0)
-        gone = self._old.select(in_front & ~self._old.pierced(z))
+        moved = z != self._last
+        self._last = z
+        beside = np.zeros(len(z), dtype=bool)
+        beside[self._faces[moved[self._faces].any(axis=1)]] = True
+        edge, face = self._old.edge, self._old.face
+        looked = beside[edge].any(axis=1) | beside[face].any(axis=1)
+        looked &= (z[edge].max(axis=1) > 0.0) & (z[face].max(axis=1) > 0.0)
+        old = self._old.select(np.flatnonzero(looked))
+        gone = old.select(~old.pierced(z))
         if len(gone) == 0:
             return Pairs.join([])
-        beside = around(gone, self._vertices, self._faces, uncrossed=True)
-        apart = ~beside.pierced(before) & (np.abs(beside.gaps(before)).max(axis=1) > _APART)
-        return beside.select(apart).pairs(before, z)
+        before = self._vertices[:, 2]
+        near = around(gone, self._vertices, self._faces, uncrossed=True)
+        apart = ~near.pierced(before) & (np.abs(near.gaps(before)).max(axis=1) > _APART)
+        return near.select(apart).pairs(before, z)
 
     def _between_parts(self) -> Crossings:
         """Find the edges that pierce triangles in the scene, near all parts but the largest."""
