@@ -44,8 +44,8 @@ def cut_crossings(
     count : int
         Number of crossings.
     """
-    heights = z[faces]
-    cut = np.flatnonzero(((heights > 0.0).sum(axis=1) == 2) & (heights.min(axis=1) < 0.0))
+    one, two, three = (np.sign(z).astype(np.int8)[faces[:, corner]] for corner in range(3))
+    cut = np.flatnonzero((one + two + three == 1) & (one * two * three < 0))
     cut = cut[_narrow(vertices[:, :2], faces[cut])]
     if len(cut) == 0:
         return Pairs.join([]), 0

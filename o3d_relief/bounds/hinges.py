@@ -49,8 +49,8 @@ def hinged_pairs(
     1
     """
     front = z > 0.0
-    in_front = front[faces]
-    cut = faces[in_front.any(axis=1) & ~in_front.all(axis=1)]
+    one, two, three = (front[faces[:, corner]] for corner in range(3))
+    cut = faces[(one != two) | (two != three)]
     beside = np.zeros(len(z), dtype=bool)
     beside[cut] = True
     chosen = pairs.select(np.flatnonzero(beside[pairs.upper].all(axis=1) & beside[pairs.lower].all(axis=1)))
