@@ -54,6 +54,8 @@ class Parted:
         """
         if self._old is None:
             self._old = self._between_parts()
+        if len(self._old) == 0:
+            return Pairs.join([])
         moved = z != self._last
         self._last = z
         beside = np.zeros(len(z), dtype=bool)
