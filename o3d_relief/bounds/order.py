@@ -184,8 +184,8 @@ class _BetweenLines:
     ) -> None:
         self._vertices, self._faces = vertices, faces
         self._edges, self._raster = edges_of(faces), Raster(vertices, faces)
-        self._parted = Parted(vertices, faces, laplacian, self._raster)
         self._last = np.full(len(vertices), np.nan)
+        self._parted = Parted(vertices, faces, laplacian, self._raster)
 
     def look_at(self, z: NDArray[np.float64]) -> tuple[Pairs, int]:
         """Return pairs that keep apart what was found, and how much it was, where something has moved."""
