@@ -23,6 +23,9 @@ seen from the front, away from its border: less is what float32 rays cannot tell
 _SHALLOW = 1e-4
 """The same for crossings that are to be mended: what is deepest between two edges is less deep at them."""
 
+_SURE = 0.999 * _DEEP
+"""The same for contact that is to be mended: the finished mesh is welded and cut, and rounds once more."""
+
 _FEW = 500
 """So many crossings at most are looked at together with what is next to them."""
 
@@ -136,7 +139,7 @@ def new_crossings(
     """
     before = vertices[:, 2]
     found = crossings(np.column_stack([vertices[:, :2], z]), faces, edges)
-    new = found.pierced(z) & ~found.pierced(before)
+    new = found.pierced(z, deep=_SURE) & ~found.pierced(before)
     apart = np.abs(found.gaps(before)).max(axis=1) > _DEEP
     new |= apart & found.pierced(z, deep=_SHALLOW) & ~found.pierced(before, deep=_SHALLOW / 2.0)
     new &= (z[found.face].max(axis=1) > 0.0) & (z[found.edge].max(axis=1) > 0.0)
