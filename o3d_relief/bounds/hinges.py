@@ -56,9 +56,9 @@ def hinged_pairs(
     chosen = pairs.select(np.flatnonzero(beside[pairs.upper].all(axis=1) & beside[pairs.lower].all(axis=1)))
     upper, lower = chosen.heights(z)
     chosen = chosen.select((upper - lower < -_EXACT) & (lower <= 0.0))
-    one = _holding(chosen.upper, chosen.upper_weights)
-    other = _holding(chosen.lower, chosen.lower_weights)
-    return chosen.select(Origin(cut, cut, vertices).meet(one, other, among=front))
+    above = _holding(chosen.upper, chosen.upper_weights)
+    below = _holding(chosen.lower, chosen.lower_weights)
+    return chosen.select(Origin(cut, cut, vertices).meet(above, below, among=front))
 
 
 def _holding(corners: NDArray[np.int64], weights: NDArray[np.float64]) -> NDArray[np.int64]:
