@@ -9,6 +9,7 @@ import open3d as o3d
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from o3d_relief.bounds.origin import triangles_cross
 from o3d_relief.bounds.pairs import Pairs
 from o3d_relief.bounds.ragged import combined
 from o3d_relief.rays import unit_box
@@ -21,6 +22,9 @@ seen from the front, away from its border: less is what float32 rays cannot tell
 
 _SHALLOW = 1e-4
 """The same for crossings that are to be mended: what is deepest between two edges is less deep at them."""
+
+_SURE = 0.999 * _DEEP
+"""The same for contact that is to be mended: the finished mesh is welded and cut, and rounds once more."""
 
 _FEW = 500
 """So many crossings at most are looked at together with what is next to them."""
@@ -135,7 +139,7 @@ def new_crossings(
     """
     before = vertices[:, 2]
     found = crossings(np.column_stack([vertices[:, :2], z]), faces, edges)
-    new = found.pierced(z) & ~found.pierced(before)
+    new = found.pierced(z, deep=_SURE) & ~found.pierced(before)
     apart = np.abs(found.gaps(before)).max(axis=1) > _DEEP
     new |= apart & found.pierced(z, deep=_SHALLOW) & ~found.pierced(before, deep=_SHALLOW / 2.0)
     new &= (z[found.face].max(axis=1) > 0.0) & (z[found.edge].max(axis=1) > 0.0)
@@ -226,7 +230,9 @@ def cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]
     return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
 
-def around(found: Crossings, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Crossings:
+def around(
+    found: Crossings, vertices: NDArray[np.float64], faces: NDArray[np.int64], *, uncrossed: bool = False
+) -> Crossings:
     """Return the edges near crossings, each with the triangles near its crossing that lie above or below it.
 
     What is kept apart at one edge likes to cross at the next: they belong together.
@@ -236,6 +242,8 @@ def around(found: Crossings, vertices: NDArray[np.float64], faces: NDArray[np.in
     found : Crossings
     vertices : (n, 3) float64
     faces : (m, 3) int64
+    uncrossed : bool
+        Of triangles that do not cross each other only.
 
     Returns
     -------
@@ -253,6 +261,8 @@ def around(found: Crossings, vertices: NDArray[np.float64], faces: NDArray[np.in
     one, other = np.concatenate([one, other]), np.concatenate([other, one])
     low, high = (extreme(vertices[:, :2][faces], axis=1) for extreme in (np.min, np.max))
     overlap = ((low[one] <= high[other]) & (low[other] <= high[one])).all(axis=1)
+    if uncrossed:
+        overlap[overlap] = ~triangles_cross(vertices[faces[one[overlap]]], vertices[faces[other[overlap]]])
     one, other = one[overlap], other[overlap]
     ends = np.sort(faces[one][:, [[0, 1], [1, 2], [2, 0]]], axis=2)
     keys = (ends[:, :, 0] * n + ends[:, :, 1]) * m + other[:, None]

@@ -10,7 +10,10 @@ from numpy.typing import NDArray
 
 from o3d_relief.bounds.correction import Correction
 from o3d_relief.bounds.crossings import edges_of, new_crossings
+from o3d_relief.bounds.cuts import cut_crossings
+from o3d_relief.bounds.hinges import hinged_pairs
 from o3d_relief.bounds.pairs import Pairs, foot_pairs
+from o3d_relief.bounds.parted import Parted
 from o3d_relief.bounds.raster import Raster
 from o3d_relief.progress import Tick, share_of_way, silent
 
@@ -32,6 +35,9 @@ _ROUNDS = 40
 
 _FEW = 3000
 """Pairs out of order on lines up to which edges that pierce triangles are looked for at the same time."""
+
+_HARDLY_ANY = 200
+"""What is out of order, on lines and between them, up to which what is rare is looked for, too."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -132,7 +138,7 @@ def keep_order(
     """
     front = np.zeros(len(z), dtype=bool) if in_front is None else in_front
     system = Correction(vertices, laplacian, areas, z)
-    lines, between = _Lines(pairs, len(z), min_gap), _BetweenLines(vertices, faces)
+    lines, between = _Lines(pairs, len(z), min_gap), _BetweenLines(vertices, faces, laplacian)
     further, floor = Pairs.join([]), np.zeros(len(z), dtype=bool)
     current, best, fewest, rounds, first = z, z, np.inf, 0, 0
     while True:
@@ -142,8 +148,11 @@ def keep_order(
         # What crosses is mostly out of order on a line as well: while there is much of it, lines will do.
         if left <= _FEW or rounds == _ROUNDS:
             found, count = between.look_at(current)
-            found = found.select(np.subtract(*found.heights(current)) < required_gaps(found, min_gap))
             left += count
+            if left <= _HARDLY_ANY:
+                rare, count = between.look_closer(current, pairs)
+                found, left = Pairs.join([found, rare]), left + count
+            found = found.select(np.subtract(*found.heights(current)) < required_gaps(found, min_gap))
             if left < fewest:
                 best, fewest = current, left
         first = first or left
@@ -170,10 +179,13 @@ def keep_order(
 class _BetweenLines:
     """Looks for edges that have begun to pierce triangles, and for what changed places where S cuts it."""
 
-    def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
+    def __init__(
+        self, vertices: NDArray[np.float64], faces: NDArray[np.int64], laplacian: sp.csr_array
+    ) -> None:
         self._vertices, self._faces = vertices, faces
         self._edges, self._raster = edges_of(faces), Raster(vertices, faces)
         self._last = np.full(len(vertices), np.nan)
+        self._parted = Parted(vertices, faces, laplacian, self._raster)
 
     def look_at(self, z: NDArray[np.float64]) -> tuple[Pairs, int]:
         """Return pairs that keep apart what was found, and how much it was, where something has moved."""
@@ -194,6 +206,14 @@ class _BetweenLines:
         at_foot = foot_pairs(vertices, faces[near & self._raster.over_or_under(cut & near)], edges, z)
         found = Pairs.join([*(pairs for pairs, _ in looked), at_foot])
         return found, sum(count for _, count in looked) + len(at_foot)
+
+    def look_closer(self, z: NDArray[np.float64], pairs: Pairs) -> tuple[Pairs, int]:
+        """Return pairs for what is rare: it hangs together over S, stands at the cut, or crossed before."""
+        hinged = hinged_pairs(self._vertices, self._faces, pairs, z)
+        parted = self._parted.look_at(z)
+        parted = parted.select(out_of_order(parted, z))
+        cut, count = cut_crossings(self._vertices, self._faces, self._raster, z)
+        return Pairs.join([hinged, parted, cut]), len(hinged) + len(parted) + count
 
 
 class _Lines:

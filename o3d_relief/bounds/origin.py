@@ -52,21 +52,31 @@ class Origin:
         found = triangles_cross(self._corners[a], self._corners[b])
         return np.bincount(row, weights=found, minlength=len(one)) > 0
 
-    def meet(self, one: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def meet(
+        self,
+        one: NDArray[np.int64],
+        other: NDArray[np.int64],
+        *,
+        among: NDArray[np.bool_] | None = None,
+    ) -> NDArray[np.bool_]:
         """Tell whether triangles around two places of the relief share a vertex.
 
         Parameters
         ----------
         one, other : (q, 3) int64
             As in `crossed`.
+        among : (n,) bool, optional
+            Vertices that count; all of them where omitted.
 
         Returns
         -------
         (q,) bool
         """
         row, a, b = self._combined(one, other)
-        found = (self._faces[a][:, :, None] == self._faces[b][:, None, :]).any(axis=(1, 2))
-        return np.bincount(row, weights=found, minlength=len(one)) > 0
+        same = self._faces[a][:, :, None] == self._faces[b][:, None, :]
+        if among is not None:
+            same &= among[self._faces[a]][:, :, None]
+        return np.bincount(row, weights=same.any(axis=(1, 2)), minlength=len(one)) > 0
 
     def _combined(
         self, one: NDArray[np.int64], other: NDArray[np.int64]
