@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from o3d_relief.bounds.bends import bend_of
 from o3d_relief.bounds.grid import grid_pairs
+from o3d_relief.bounds.lines import Lines
 from o3d_relief.bounds.order import Ordered, keep_order
 from o3d_relief.bounds.pairs import Pairs, close_pairs
 from o3d_relief.bounds.silhouettes import silhouette_pairs
@@ -34,6 +35,7 @@ def order_step(
     laplacian: sp.csr_array,
     restored: RestorationStage,
     points: AttenuationStage,
+    lines: Lines,
     pairs: Pairs | None,
     params: ReliefParams,
     unit: float,
@@ -47,7 +49,7 @@ def order_step(
     # The compression comes later and shrinks gaps, at most by its smallest ratio.
     ratio, lowest = ratios(z, params, unit)
     min_gap = params.min_gap / unit / (0.95 * lowest if ratio < 1.0 else 1.0)
-    pairs = Pairs.join([pairs, _further_pairs(vertices, faces, min_gap)])
+    pairs = Pairs.join([pairs, _further_pairs(vertices, faces, lines, min_gap)])
     areas = vertex_areas(vertices, faces)
     front = visible if params.in_front else None
 
@@ -72,10 +74,13 @@ def order_step(
     return OrderStage(z=on_plane(ordered.z), counts=counts)
 
 
-def _further_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64], min_gap: float) -> Pairs:
+def _further_pairs(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], lines: Lines, min_gap: float
+) -> Pairs:
     """Pair what is stacked elsewhere than at vertices, and what is very close to them.
 
     For a smallest gap, which need not be least at vertices and silhouettes, the grid is a fine one.
     """
-    grid = grid_pairs(vertices, faces, side=_LINES if min_gap == 0.0 else 4 * _LINES)
-    return Pairs.join([silhouette_pairs(vertices, faces), close_pairs(vertices, faces), grid])
+    grid = grid_pairs(vertices, faces, side=_LINES if min_gap == 0.0 else 4 * _LINES, lines=lines)
+    close = close_pairs(vertices, faces, lines=lines)
+    return Pairs.join([silhouette_pairs(vertices, faces), close, grid])

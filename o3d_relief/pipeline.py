@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from o3d_relief.attenuation_step import attenuation_step
 from o3d_relief.bounded_step import bounded_step
 from o3d_relief.bounds.certificate import Certificate, certify
+from o3d_relief.bounds.lines import Lines
 from o3d_relief.errors import MeshError, ParameterError
 from o3d_relief.journal import Journal, OnStage
 from o3d_relief.linalg.laplacian import cotangent_laplacian
@@ -251,7 +252,8 @@ def make_relief(
         journal.begin("attenuation")
         points = journal.keep(attenuation_step(vertices, visible, scene, clusters, params))
         journal.begin("construction")
-        pairs = stacked_pairs(vertices, faces, params)
+        lines = Lines(vertices, faces)
+        pairs = stacked_pairs(lines, params)
         z = journal.keep(
             construction_step(
                 vertices, faces, visible, laplacian, slivers, clusters, points, pairs, tick=journal.tick
@@ -271,6 +273,7 @@ def make_relief(
             laplacian,
             restored,
             points,
+            lines,
             pairs,
             params,
             scene.unit,

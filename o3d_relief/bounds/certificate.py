@@ -11,7 +11,7 @@ from o3d_relief.bounds.bends import normal_changes
 from o3d_relief.bounds.crossings import crossings, edges_of
 from o3d_relief.bounds.grid import grid_pairs
 from o3d_relief.bounds.inversions import inversions
-from o3d_relief.bounds.lines import upright
+from o3d_relief.bounds.lines import Lines, upright
 from o3d_relief.bounds.origin import Origin
 from o3d_relief.bounds.pairs import vertex_pairs
 from o3d_relief.bounds.places import Place, behind_places, crossing_places, told
@@ -148,8 +148,11 @@ def certify(
     origin = Origin(relief_faces, relief_parents, scene)
     # Pairs leave out what stands upright in the relief, and here also what did so in the scene.
     lying = relief_faces[~upright(before, relief_faces)]
-    low, high = scene.min(axis=0), scene.max(axis=0)
-    stacked = vertex_pairs(relief, lying), grid_pairs(relief, lying, low=low, high=high)
+    low, high, lines = scene.min(axis=0), scene.max(axis=0), Lines(relief, lying)
+    stacked = (
+        vertex_pairs(relief, lying, lines=lines),
+        grid_pairs(relief, lying, low=low, high=high, lines=lines),
+    )
     both = [inversions(relief, pairs, relief_before, origin, min_gap=min_gap) for pairs in stacked]
     edges = edges_of(relief_faces)
     met = crossings(relief, relief_faces, edges)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
 from o3d_relief.rays import unit_box
 
-__all__ = ["MISS", "SAME_PLACE", "UP", "Borders", "UnitBox", "upright", "weights_of"]
+__all__ = ["MISS", "SAME_PLACE", "UP", "Borders", "Lines", "UnitBox", "upright", "weights_of"]
 
 SAME_PLACE = 5e-4
 """Points of a line that are closer than this, in relief units, are one: rays are cast in float32."""
@@ -95,6 +97,43 @@ class UnitBox:
         rays[:, :3] = (origins - self.middle) / self.size
         rays[:, 3:] = direction
         return o3d.core.Tensor(rays)
+
+
+class Lines:
+    """What lines along z meet in points: the faces of a mesh that do not stand upright.
+
+    Everything is made when it is needed, and once for all who cast lines through the mesh.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+        In the relief frame, in relief units.
+    faces : (m, 3) int64
+
+    Attributes
+    ----------
+    vertices : (n, 3) float64
+    faces : (l, 3) int64
+        Without those that stand upright.
+    box : UnitBox
+    borders : Borders
+        Both of these faces.
+    """
+
+    def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
+        self.vertices, self._all = vertices, faces
+
+    @cached_property
+    def faces(self) -> NDArray[np.int64]:
+        return self._all[~upright(self.vertices, self._all)]
+
+    @cached_property
+    def box(self) -> UnitBox:
+        return UnitBox(self.vertices, self.faces)
+
+    @cached_property
+    def borders(self) -> Borders:
+        return Borders(self.vertices, self.faces)
 
 
 def weights_of(uv: NDArray[np.float32]) -> NDArray[np.float64]:

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o3d_relief.bounds.aligned import APART, aligned_pairs, footprints
-from o3d_relief.bounds.crossings import cross, edges_of
 from o3d_relief.bounds.pairs import Pairs
 
 __all__ = ["silhouette_pairs", "silhouettes"]
@@ -41,17 +40,29 @@ def silhouettes(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDAr
         Edges of one face or of more than two, those whose two faces lie on the same side, and those of faces
         that stand upright.
     """
-    start, end, opposite = faces[:, _CORNERS].transpose(2, 0, 1).reshape(3, -1)
-    low, high = np.minimum(start, end), np.maximum(start, end)
-    plane = vertices[:, :2]
-    side = np.sign(cross(plane[high] - plane[low], plane[opposite] - plane[low]))
-    edge = low * len(vertices) + high
-    order = np.argsort(edge, kind="stable")
-    first = np.flatnonzero(np.diff(edge[order], prepend=-1))
-    count = np.diff(np.append(first, len(order)))
-    following = order[np.minimum(first + 1, len(order) - 1)]
-    plain = (count == 2) & (side[order[first]] * side[following] < 0)
-    return np.stack(np.divmod(edge[order[first]][~plain], len(vertices)), axis=1)
+    edges, turning = _edges_that_turn(vertices, faces)
+    return edges[turning]
+
+
+def _edges_that_turn(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Return all edges as `edges_of` does, (e, 2), and which of them are silhouettes, (e,)."""
+    x, y = np.ascontiguousarray(vertices[:, :2].T)
+    corners = np.ascontiguousarray(faces.T)
+    keys = []
+    for start, end, opposite in corners[_CORNERS]:
+        low, high = np.minimum(start, end), np.maximum(start, end)
+        along_x, along_y = x[high] - x[low], y[high] - y[low]
+        side = np.sign(along_x * (y[opposite] - y[low]) - along_y * (x[opposite] - x[low]))
+        # The side of the third corner, -1, 0 or 1, goes into the last two bits.
+        keys.append(4 * (low * len(vertices) + high) + side.astype(np.int64) + 1)
+    sided = np.sort(np.concatenate(keys))
+    edge, side = sided >> 2, (sided & 3) - 1
+    first = np.flatnonzero(np.diff(edge, prepend=-1))
+    count = np.diff(np.append(first, len(edge)))
+    plain = (count == 2) & (side[first] * side[np.minimum(first + 1, len(edge) - 1)] < 0)
+    return np.stack(np.divmod(edge[first], len(vertices)), axis=1), ~plain
 
 
 def silhouette_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Pairs:
@@ -81,8 +92,7 @@ def silhouette_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64]) ->
     >>> silhouette_pairs(places, np.array([[0, 1, 2], [3, 4, 5]])).gap.tolist()
     [1.0, 1.0, 1.0, 1.0]
     """
-    edges = edges_of(faces)
-    turning = np.isin(edges @ [len(vertices), 1], silhouettes(vertices, faces) @ [len(vertices), 1])
+    edges, turning = _edges_that_turn(vertices, faces)
     # Of edges on top of each other, one tells where all of them cross others.
     prints = footprints(vertices, faces, edges, np.flatnonzero(turning))
     stacked = _overlapping(vertices[:, :2], edges, _in_one_cell(vertices, edges, prints.first))
