@@ -6,17 +6,16 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from o3d_relief.bounds.bends import bend_of
 from o3d_relief.bounds.grid import grid_pairs
 from o3d_relief.bounds.lines import Lines
+from o3d_relief.bounds.near_points import NearPoints
 from o3d_relief.bounds.order import Ordered, keep_order
 from o3d_relief.bounds.pairs import Pairs, close_pairs
 from o3d_relief.bounds.silhouettes import silhouette_pairs
-from o3d_relief.bounds.stiffness import Stiffness
 from o3d_relief.linalg.laplacian import vertex_areas
 from o3d_relief.params import ReliefParams
 from o3d_relief.progress import Tick, silent
-from o3d_relief.records import AttenuationStage, OrderStage, RestorationStage
+from o3d_relief.records import OrderStage, RestorationStage
 from o3d_relief.steps import on_plane, ratios
 
 __all__ = ["order_step"]
@@ -34,7 +33,7 @@ def order_step(
     visible: NDArray[np.bool_],
     laplacian: sp.csr_array,
     restored: RestorationStage,
-    points: AttenuationStage,
+    around: NearPoints,
     lines: Lines,
     pairs: Pairs | None,
     params: ReliefParams,
@@ -59,10 +58,9 @@ def order_step(
     if restored.stiffness == 0.0:
         ordered = ordered_with(laplacian)
     else:
-        stiff = Stiffness(vertices, faces, points.kept_index)
         for stiffer in _STIFFER:
-            ordered = ordered_with(stiff.added_to(laplacian, restored.stiffness * stiffer))
-            near, elsewhere = bend_of(vertices, ordered.z, faces, visible, points.kept_index)
+            ordered = ordered_with(around.stiffness.added_to(laplacian, restored.stiffness * stiffer))
+            near, elsewhere = around.bends.most(ordered.z)
             if ordered.rounds == 0 or near <= elsewhere:
                 break
     counts = {

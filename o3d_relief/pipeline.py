@@ -16,6 +16,7 @@ from o3d_relief.attenuation_step import attenuation_step
 from o3d_relief.bounded_step import bounded_step
 from o3d_relief.bounds.certificate import Certificate, certify
 from o3d_relief.bounds.lines import Lines
+from o3d_relief.bounds.near_points import NearPoints
 from o3d_relief.errors import MeshError, ParameterError
 from o3d_relief.journal import Journal, OnStage
 from o3d_relief.linalg.laplacian import cotangent_laplacian
@@ -260,9 +261,10 @@ def make_relief(
             )
         ).z
         journal.begin("restoration")
+        around = NearPoints(vertices, faces, visible, points.kept_index)
         restored = journal.keep(
             restoration_step(
-                vertices, faces, visible, laplacian, z, clusters, points, params, tick=journal.tick
+                vertices, visible, laplacian, z, clusters, points, around, params, tick=journal.tick
             )
         )
         journal.begin("order")
@@ -272,7 +274,7 @@ def make_relief(
             visible,
             laplacian,
             restored,
-            points,
+            around,
             lines,
             pairs,
             params,

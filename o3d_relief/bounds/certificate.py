@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from o3d_relief.bounds.bends import normal_changes
+from o3d_relief.bounds.bends import Bends
 from o3d_relief.bounds.crossings import crossings, edges_of
 from o3d_relief.bounds.grid import grid_pairs
 from o3d_relief.bounds.inversions import inversions
@@ -158,8 +158,7 @@ def certify(
     met = crossings(relief, relief_faces, edges)
     met = met.select(met.pierced(relief[:, 2]))
     old = met.pierced(relief_before) | origin.crossed(met.edge[:, [0, 1, 1]], met.face)
-    after = np.column_stack([scene[:, :2], heights])
-    near, elsewhere = normal_changes(scene, after, scene_faces, visible, points)
+    near, elsewhere = Bends(scene, scene_faces, visible, points).angles(heights)
     return Certificate(
         visible_tested=int(visible.sum()),
         visible_behind=int((heights[visible] < 0.0).sum()),

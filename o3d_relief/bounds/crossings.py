@@ -243,6 +243,11 @@ def around(found: Crossings, vertices: NDArray[np.float64], faces: NDArray[np.in
         Among the edges of all triangles that share a vertex with one of the two, and the triangles that
         share a vertex with the other.
     """
+    here = np.zeros(len(vertices), dtype=bool)
+    here[found.edge] = True
+    here[found.face] = True
+    a, b, c = faces.T
+    faces = faces[here[a] | here[b] | here[c]]
     n, m = len(vertices), len(faces)
     entries = np.ones(faces.size, dtype=bool), (faces.ravel(), np.repeat(np.arange(m), 3))
     beside = sp.csr_array(entries, shape=(n, m))

@@ -114,10 +114,8 @@ class Lines:
     ----------
     vertices : (n, 3) float64
     faces : (l, 3) int64
-        Without those that stand upright.
     box : UnitBox
     borders : Borders
-        Both of these faces.
     """
 
     def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
@@ -125,14 +123,17 @@ class Lines:
 
     @cached_property
     def faces(self) -> NDArray[np.int64]:
+        """The faces that do not stand upright."""
         return self._all[~upright(self.vertices, self._all)]
 
     @cached_property
     def box(self) -> UnitBox:
+        """Their scene."""
         return UnitBox(self.vertices, self.faces)
 
     @cached_property
     def borders(self) -> Borders:
+        """Their borders."""
         return Borders(self.vertices, self.faces)
 
 
