@@ -6,7 +6,7 @@ from shapes import grid
 
 
 def test_a_spike_at_a_point_bends_what_is_made_stiffer():
-    vertices, faces = grid(41)
+    vertices, faces = grid(101)  # one unit between vertices
     point = int(np.linalg.norm(vertices, axis=1).argmin())
     around = NearPoints(vertices, faces, np.ones(len(vertices), dtype=bool), np.array([point]))
     z = np.zeros(len(vertices))
