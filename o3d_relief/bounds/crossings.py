@@ -101,11 +101,12 @@ class Crossings:
 
     def select(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Crossings:
         """Return some of them, by a mask or by number."""
+        number = np.flatnonzero(chosen) if chosen.dtype == bool else chosen
         return Crossings(
-            edge=self.edge[chosen],
-            face=self.face[chosen],
-            along=self.along[chosen],
-            inside=self.inside[chosen],
+            edge=self.edge.take(number, axis=0),
+            face=self.face.take(number, axis=0),
+            along=self.along.take(number, axis=0),
+            inside=self.inside.take(number, axis=0),
         )
 
 

@@ -66,23 +66,29 @@ class Borders:
         alone[:-1] &= ~same
         single = ordered[alone]
         place = np.minimum(np.searchsorted(single, edge), max(len(single) - 1, 0))
-        self._on_border = single[place].T == edge.T if len(single) else np.zeros(faces.shape, dtype=bool)
+        self._on_border = single[place] == edge if len(single) else np.zeros(edge.shape, dtype=bool)
         at_border = np.zeros(n, dtype=bool)
         at_border[single // n] = True
         at_border[single % n] = True
-        self._corner_on_border = at_border[faces]
+        self._corner_on_border = at_border[corners]
         x, y = np.ascontiguousarray(vertices[:, :2].T)
         across, along = x[end] - x[start], y[end] - y[start]
         area = np.abs(across[0] * along[1] - along[0] * across[1])
         opposite = np.sqrt(across**2 + along**2)
-        self._height = (area / np.maximum(opposite, np.finfo(np.float64).tiny)).T
+        self._height = area / np.maximum(opposite, np.finfo(np.float64).tiny)
 
     def grazed(self, triangle: NDArray[np.int64], weights: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Tell which points of triangles, (q,) and (q, 3), lie on a border, to a rounding error."""
-        near = weights * self._height[triangle] < 2 * SAME_PLACE
-        at_corner = near.sum(axis=1, keepdims=True) - near == 2
-        grazed = (near & self._on_border[triangle]) | (at_corner & self._corner_on_border[triangle])
-        return np.asarray(grazed.any(axis=1))
+        near = [
+            own * height[triangle] < 2 * SAME_PLACE
+            for own, height in zip(weights.T, self._height, strict=True)
+        ]
+        grazed = np.zeros(len(triangle), dtype=bool)
+        for side in range(3):
+            at_corner = near[side - 2] & near[side - 1]
+            grazed |= near[side] & self._on_border[side][triangle]
+            grazed |= at_corner & self._corner_on_border[side][triangle]
+        return grazed
 
 
 class UnitBox:

@@ -205,6 +205,7 @@ class _Lines:
 
     def __init__(self, pairs: Pairs, n: int, min_gap: float) -> None:
         self._pairs, self._min_gap = pairs, min_gap
+        self._corners = np.concatenate([pairs.upper.T, pairs.lower.T])
         self._held = np.zeros(len(pairs), dtype=bool)
         self._ever, self._again = self._held.copy(), self._held.copy()
         self._last = np.full(n, np.nan)
@@ -218,7 +219,10 @@ class _Lines:
         """Find what is wrong now; only pairs of which a vertex has moved can have changed."""
         moved = z != self._last
         self._last = z
-        changed = np.flatnonzero(moved[self._pairs.upper].any(axis=1) | moved[self._pairs.lower].any(axis=1))
+        of_moved = np.zeros(len(self._pairs), dtype=bool)
+        for corner in self._corners:
+            of_moved |= moved[corner]
+        changed = np.flatnonzero(of_moved)
         self.wrong[changed] = out_of_order(self._pairs.select(changed), z, min_gap=self._min_gap)
 
     def let_go(self, z: NDArray[np.float64]) -> None:

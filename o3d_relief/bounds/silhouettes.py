@@ -133,7 +133,7 @@ def _in_one_cell(
     keys = []
     for corner in np.array([[0, 0], [0, 1], [1, 0], [1, 1]]):
         cell = least + corner
-        inside = (cell <= most).all(axis=1)
+        inside = (cell[:, 0] <= most[:, 0]) & (cell[:, 1] <= most[:, 1])
         place = (cell[inside, 0] + 1) * (cells + 3) + cell[inside, 1] + 1
         keys.append(place * len(edges) + chosen[edge[inside]])
     return _within(np.concatenate(keys), len(edges))
@@ -146,7 +146,8 @@ def _in_one_star(
     n = int(faces.max(initial=0)) + 1
     at_turning = np.zeros(n, dtype=bool)
     at_turning[edges[turning]] = True
-    around = faces[at_turning[faces].any(axis=1)]
+    a, b, c = faces.T
+    around = faces[at_turning[a] | at_turning[b] | at_turning[c]]
     low, high = np.sort(around[:, [[0, 1], [1, 2], [2, 0]]], axis=2).transpose(2, 0, 1)
     number = np.searchsorted(edges @ [n, 1], low * n + high)
     keys = around[:, :, None] * len(edges) + number[:, None, :]
@@ -189,6 +190,10 @@ def _meeting(
     other: NDArray[np.int64],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
     """Choose the edges that cross in the picture, each two once; return where, as shares of both."""
+    # Edges that share a vertex do not cross.
+    (begin, end), (other_begin, other_end) = edges.T[:, one], edges.T[:, other]
+    meet = (begin == other_begin) | (end == other_end) | (begin == other_end) | (end == other_begin)
+    one, other = one[~meet], other[~meet]
     shares: list[NDArray[np.float64]] = []
     for _ in (0, 1):
         first, second = _sides(plane, edges, one, other)
