@@ -142,7 +142,7 @@ def _in_one_cell(
 def _in_one_star(
     faces: NDArray[np.int64], edges: NDArray[np.int64], turning: NDArray[np.bool_]
 ) -> NDArray[np.int64]:
-    """Find edges of faces that share a vertex of a silhouette: their numbers, (2, q), some twice."""
+    """Find edges around a vertex of a silhouette that share no vertex: their numbers, (2, q), some twice."""
     n = int(faces.max(initial=0)) + 1
     at_turning = np.zeros(n, dtype=bool)
     at_turning[edges[turning]] = True
@@ -151,7 +151,13 @@ def _in_one_star(
     low, high = np.sort(around[:, [[0, 1], [1, 2], [2, 0]]], axis=2).transpose(2, 0, 1)
     number = np.searchsorted(edges @ [n, 1], low * n + high)
     keys = around[:, :, None] * len(edges) + number[:, None, :]
-    return _within(keys[at_turning[around]].ravel(), len(edges))
+    both = _within(keys[at_turning[around]].ravel(), len(edges))
+    # What shares a vertex does not cross, and is most of it.
+    begin, end = np.ascontiguousarray(edges.T)
+    (one_begin, other_begin), (one_end, other_end) = begin[both], end[both]
+    meet = (one_begin == other_begin) | (one_end == other_end)
+    meet |= (one_begin == other_end) | (one_end == other_begin)
+    return both.compress(~meet, axis=1)
 
 
 def _within(keys: NDArray[np.int64], n: int) -> NDArray[np.int64]:
@@ -190,10 +196,6 @@ def _meeting(
     other: NDArray[np.int64],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
     """Choose the edges that cross in the picture, each two once; return where, as shares of both."""
-    # Edges that share a vertex do not cross.
-    (begin, end), (other_begin, other_end) = edges.T[:, one], edges.T[:, other]
-    meet = (begin == other_begin) | (end == other_end) | (begin == other_end) | (end == other_begin)
-    one, other = one[~meet], other[~meet]
     shares: list[NDArray[np.float64]] = []
     for _ in (0, 1):
         first, second = _sides(plane, edges, one, other)
