@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 __all__ = ["Bends"]
 
@@ -21,8 +20,8 @@ class Bends:
         Before.
     faces : (m, 3) int64
     visible : (n,) bool
-    points : (q,) int64
-        The kept attenuation points.
+    distance : (m,) float64
+        Of the middle of each face from the attenuation points, in relief units.
     """
 
     def __init__(
@@ -30,18 +29,15 @@ class Bends:
         vertices: NDArray[np.float64],
         faces: NDArray[np.int64],
         visible: NDArray[np.bool_],
-        points: NDArray[np.int64],
+        distance: NDArray[np.float64],
     ) -> None:
         a, b, c = faces.T
-        seen = faces[visible[a] & visible[b] & visible[c]]
+        seen = np.flatnonzero(visible[a] & visible[b] & visible[c])
         x, y, z = np.ascontiguousarray(vertices.T)
-        self._corners = np.ascontiguousarray(seen.T)
-        a, b, c = self._corners
+        self._corners = a, b, c = np.ascontiguousarray(faces.take(seen, axis=0).T)
         self._sides = x[b] - x[a], y[b] - y[a], x[c] - x[a], y[c] - y[a]
         self._before = self._normals(z)
-        middle = vertices[seen].mean(axis=1)
-        distance, _ = cKDTree(vertices[points]).query(middle, distance_upper_bound=2.0 * _NEAR)
-        self._near = distance <= _NEAR
+        self._near = distance[seen] <= _NEAR
 
     def _normals(self, z: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
         """Return the normals of the faces, as long as twice their areas, and their lengths."""

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from o3d_relief.bounds.bends import Bends
 from o3d_relief.bounds.crossings import crossings, edges_of
 from o3d_relief.bounds.grid import grid_pairs
 from o3d_relief.bounds.inversions import inversions
 from o3d_relief.bounds.lines import Lines, upright
+from o3d_relief.bounds.near_points import NearPoints
 from o3d_relief.bounds.origin import Origin
 from o3d_relief.bounds.pairs import vertex_pairs
 from o3d_relief.bounds.places import Place, behind_places, crossing_places, told
@@ -158,7 +158,7 @@ def certify(
     met = crossings(relief, relief_faces, edges)
     met = met.select(met.pierced(relief[:, 2]))
     old = met.pierced(relief_before) | origin.crossed(met.edge[:, [0, 1, 1]], met.face)
-    near, elsewhere = Bends(scene, scene_faces, visible, points).angles(heights)
+    near, elsewhere = NearPoints(scene, scene_faces, visible, points).bends.angles(heights)
     return Certificate(
         visible_tested=int(visible.sum()),
         visible_behind=int((heights[visible] < 0.0).sum()),

@@ -65,11 +65,13 @@ class Borders:
         alone[1:] &= ~same
         alone[:-1] &= ~same
         single = ordered[alone]
-        place = np.minimum(np.searchsorted(single, edge), max(len(single) - 1, 0))
-        self._on_border = single[place] == edge if len(single) else np.zeros(edge.shape, dtype=bool)
         at_border = np.zeros(n, dtype=bool)
         at_border[single // n] = True
         at_border[single % n] = True
+        self._on_border = at_border[start] & at_border[end]
+        likely = edge[self._on_border]
+        place = np.minimum(np.searchsorted(single, likely), max(len(single) - 1, 0))
+        self._on_border[self._on_border] = single[place] == likely
         self._corner_on_border = at_border[corners]
         x, y = np.ascontiguousarray(vertices[:, :2].T)
         across, along = x[end] - x[start], y[end] - y[start]
