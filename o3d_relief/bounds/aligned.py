@@ -17,6 +17,9 @@ _ON = 1e-3
 APART = 5e-4
 """Smallest gap in relief units: edges that touch are in no order."""
 
+_BLOCK = 16384
+"""Edges that are worked on at once."""
+
 _ONE_PLACE = 1e-4
 """Rounding, in relief units, by which points count as one in the picture: what is missed costs time only."""
 
@@ -129,9 +132,10 @@ def aligned_pairs(
     """
     number = prints.numbers()
     itself = np.tile(prints.first, (2, 1))
+    plane = np.ascontiguousarray(vertices[:, :2])
     a, b = np.concatenate([both, both[::-1], itself], axis=1)
-    a, b, place = _on_each_other(vertices[:, :2], edges, a, b)
-    covered = _cover(vertices[:, :2], edges, prints, number, a, b, place)
+    a, b, place = _on_each_other(plane, edges, a, b)
+    covered = _cover(plane, edges, prints, number, a, b, place)
     # Every end above the place, on every edge over the footprint.
     tips, tip_of = prints.members(number[a[covered]])
     ends = edges[tips]
@@ -149,9 +153,13 @@ def _on_each_other(
     """Choose edges a of which an end lies on b in the picture; return them and which end, 0 or 1."""
     found = []
     for end in (0, 1):
-        share, off, length = _projected(plane, edges[b], edges[a, end])
-        on = np.flatnonzero((np.abs(off) <= _ON) & (share * length >= -_ON) & ((share - 1.0) * length <= _ON))
-        found.append((a[on], b[on], np.full(len(on), end)))
+        on = np.zeros(len(a), dtype=bool)
+        for block in range(0, len(a), _BLOCK):
+            part = slice(block, block + _BLOCK)
+            share, off, length = _projected(plane, edges.take(b[part], axis=0), edges[a[part], end])
+            along = (share * length >= -_ON) & ((share - 1.0) * length <= _ON)
+            on[part] = (np.abs(off) <= _ON) & along
+        found.append((a[on], b[on], np.full(np.count_nonzero(on), end)))
     one, other, ends = (np.concatenate(parts) for parts in zip(*found, strict=True))
     return one, other, ends
 
@@ -160,8 +168,8 @@ def _projected(
     plane: NDArray[np.float64], edges: NDArray[np.int64], points: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Return where points lie along edges, as a share, how far to their left, and how long they are."""
-    begin = plane[edges[:, 0]]
-    along, from_begin = plane[edges[:, 1]] - begin, plane[points] - begin
+    begin = plane.take(edges[:, 0], axis=0)
+    along, from_begin = plane.take(edges[:, 1], axis=0) - begin, plane.take(points, axis=0) - begin
     length = np.sqrt(along[:, 0] ** 2 + along[:, 1] ** 2)
     share = (along[:, 0] * from_begin[:, 0] + along[:, 1] * from_begin[:, 1]) / length**2
     return share, (along[:, 0] * from_begin[:, 1] - along[:, 1] * from_begin[:, 0]) / length, length
@@ -177,6 +185,23 @@ def _cover(
     place: NDArray[np.int64],
 ) -> NDArray[np.bool_]:
     """Tell for each end of an edge a that lies on b whether faces over the footprints of both overlap."""
+    covered = np.zeros(len(a), dtype=bool)
+    for block in range(0, len(a), _BLOCK):
+        part = slice(block, block + _BLOCK)
+        covered[part] = _covers(plane, edges, prints, number, a[part], b[part], place[part])
+    return covered
+
+
+def _covers(
+    plane: NDArray[np.float64],
+    edges: NDArray[np.int64],
+    prints: Footprints,
+    number: NDArray[np.int64],
+    a: NDArray[np.int64],
+    b: NDArray[np.int64],
+    place: NDArray[np.int64],
+) -> NDArray[np.bool_]:
+    """Do so for one block of them."""
     left, right = prints.left, prints.right
     tip, far = edges[a, place], edges[a, 1 - place]
     share, off, length = _projected(plane, edges[b], far)

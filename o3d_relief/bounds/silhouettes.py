@@ -93,13 +93,14 @@ def silhouette_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64]) ->
     [1.0, 1.0, 1.0, 1.0]
     """
     edges, turning = _edges_that_turn(vertices, faces)
+    plane = np.ascontiguousarray(vertices[:, :2])
     # Of edges on top of each other, one tells where all of them cross others.
     prints = footprints(vertices, faces, edges, np.flatnonzero(turning))
-    stacked = _overlapping(vertices[:, :2], edges, _in_one_cell(vertices, edges, prints.first))
-    far = prints.combined(*_meeting(vertices[:, :2], edges, *stacked)[:2])
-    near = _overlapping(vertices[:, :2], edges, _in_one_star(faces, edges, turning))
+    stacked = _overlapping(plane, edges, _in_one_cell(vertices, edges, prints.first))
+    far = prints.combined(*_meeting(plane, edges, *stacked)[:2])
+    near = _overlapping(plane, edges, _in_one_star(faces, edges, turning))
     one, other = np.concatenate([far, near], axis=1)
-    one, other, share, other_share = _meeting(vertices[:, :2], edges, one, other)
+    one, other, share, other_share = _meeting(plane, edges, one, other)
     ends, other_ends = vertices[edges[one], 2], vertices[edges[other], 2]
     height = ends[:, 0] * (1.0 - share) + ends[:, 1] * share
     other_height = other_ends[:, 0] * (1.0 - other_share) + other_ends[:, 1] * other_share
@@ -148,16 +149,22 @@ def _in_one_star(
     at_turning[edges[turning]] = True
     a, b, c = faces.T
     around = faces[at_turning[a] | at_turning[b] | at_turning[c]]
-    low, high = np.sort(around[:, [[0, 1], [1, 2], [2, 0]]], axis=2).transpose(2, 0, 1)
-    number = np.searchsorted(edges @ [n, 1], low * n + high)
-    keys = around[:, :, None] * len(edges) + number[:, None, :]
-    both = _within(keys[at_turning[around]].ravel(), len(edges))
-    # What shares a vertex does not cross, and is most of it.
+    start = np.ascontiguousarray(around.T)
+    end = start[[1, 2, 0]]
+    number = np.searchsorted(edges @ [n, 1], np.minimum(start, end) * n + np.maximum(start, end))
+    keys = []
+    for corner in start:
+        chosen = at_turning[corner]
+        keys.append(corner[chosen] * len(edges) + number[:, chosen])
+    both = _within(np.concatenate(keys, axis=1).ravel(), len(edges))
+    # What shares a vertex does not cross, and is half of it.
     begin, end = np.ascontiguousarray(edges.T)
-    (one_begin, other_begin), (one_end, other_end) = begin[both], end[both]
-    meet = (one_begin == other_begin) | (one_end == other_end)
-    meet |= (one_begin == other_end) | (one_end == other_begin)
-    return both.compress(~meet, axis=1)
+    apart = np.zeros(both.shape[1], dtype=bool)
+    for block in range(0, both.shape[1], _BLOCK):
+        one, other = both[:, block : block + _BLOCK]
+        a, b, c, d = begin[one], end[one], begin[other], end[other]
+        apart[block : block + _BLOCK] = (a != c) & (a != d) & (b != c) & (b != d)
+    return both.compress(apart, axis=1)
 
 
 def _within(keys: NDArray[np.int64], n: int) -> NDArray[np.int64]:
@@ -176,17 +183,17 @@ def _overlapping(
     plane: NDArray[np.float64], edges: NDArray[np.int64], both: NDArray[np.int64]
 ) -> NDArray[np.int64]:
     """Choose the edges whose boxes in the picture overlap or touch: their numbers, (2, q)."""
-    begin, end = plane[edges].transpose(1, 0, 2)
+    begin, end = (plane.take(tip, axis=0) for tip in edges.T)
     box = np.concatenate([np.minimum(begin, end), -np.maximum(begin, end)], axis=1)
     turned = np.ascontiguousarray(box[:, [2, 3, 0, 1]])
     near = np.zeros(both.shape[1], dtype=bool)
     for block in range(0, both.shape[1], _BLOCK):
         one, other = both[:, block : block + _BLOCK]
-        beyond = box[one]
-        beyond += turned[other]
+        beyond = box.take(one, axis=0)
+        beyond += turned.take(other, axis=0)
         x, y, back_x, back_y = (beyond <= _CLEAR).T
         near[block : block + _BLOCK] = x & y & back_x & back_y
-    return both[:, near]
+    return both.compress(near, axis=1)
 
 
 def _meeting(
