@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from o3d_relief.bounds.aligned import APART, aligned_pairs, footprints
+from o3d_relief.bounds.aligned import APART, aligned_pairs
+from o3d_relief.bounds.footprints import footprints
 from o3d_relief.bounds.pairs import Pairs
 
 __all__ = ["silhouette_pairs", "silhouettes"]
