@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from o3d_relief.bounds.bounded import closest_relief, lowest_seen
 from o3d_relief.bounds.extremes import extreme_pairs
 from o3d_relief.bounds.grid import grid_pairs
+from o3d_relief.bounds.lines import Lines
 from o3d_relief.bounds.pairs import Pairs, vertex_pairs
 from o3d_relief.bounds.parts import tie_parts
 from o3d_relief.bounds.seen import face_weights, point_rows, seen_faces, seen_points
@@ -60,7 +61,8 @@ def bounded_step(
         return BoundedStage(face_weight=weight, attached=attached, z=on_plane(z - lowest), counts=shallow)
 
     form, slivers = cotangent_laplacian(vertices, faces, weights=weight)
-    stacked = vertex_pairs(vertices, faces)
+    lines = Lines(vertices, faces)
+    stacked = vertex_pairs(vertices, faces, lines=lines)
     ties = tie_parts(
         vertices, faces, form, np.arange(n), stacked, stacked.gap * (depth / deep), across_gaps=_EMPTY
     )
@@ -69,7 +71,7 @@ def bounded_step(
         faces,
         form if ties is None else form + ties.among_held,
         depth,
-        _stacked(vertices, faces, stacked, params),
+        _stacked(vertices, faces, lines, stacked, params),
         seen,
         visible,
         pull=np.zeros(n) if ties is None else ties.among_held_pull,
@@ -94,10 +96,14 @@ def bounded_step(
 
 
 def _stacked(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], stacked: Pairs, params: ReliefParams
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    lines: Lines,
+    stacked: Pairs,
+    params: ReliefParams,
 ) -> Pairs:
     """Add to the pairs of vertices those where silhouettes cross, and on a grid what these do not imply."""
-    grid = grid_pairs(vertices, faces)
+    grid = grid_pairs(vertices, faces, lines=lines)
     grid = grid.select(grid.gap > _CONTACT)
     if params.min_gap == 0.0:  # what is asked of the others is not linear between two triangles
         grid = extreme_pairs(grid, vertices[:, :2])

@@ -18,6 +18,7 @@ import open3d as o3d
 from numpy.typing import NDArray
 
 from o3d_relief.bounds.grid import grid_pairs
+from o3d_relief.bounds.lines import Lines
 from o3d_relief.bounds.pairs import Pairs, vertex_pairs
 from o3d_relief.errors import ParameterError
 from o3d_relief.scene.convert import arrays_mesh, mesh_arrays
@@ -224,7 +225,10 @@ class Yardstick:
         z = z[self._used] / self._unit
         if self._pairs is None:
             vertices, faces = self._scene.vertices, self._scene.faces
-            self._pairs = Pairs.join([vertex_pairs(vertices, faces), grid_pairs(vertices, faces)])
+            lines = Lines(vertices, faces)
+            self._pairs = Pairs.join(
+                [vertex_pairs(vertices, faces, lines=lines), grid_pairs(vertices, faces, lines=lines)]
+            )
         upper, lower = self._pairs.heights(z)
         # What ends behind S is cut off: it is in nobody's way.
         inverted = (upper < lower - _SAME) & (np.maximum(upper, lower) > 0.0)

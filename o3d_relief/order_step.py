@@ -6,16 +6,16 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from o3d_relief.bounds.bends import bend_of
 from o3d_relief.bounds.grid import grid_pairs
+from o3d_relief.bounds.lines import Lines
+from o3d_relief.bounds.near_points import NearPoints
 from o3d_relief.bounds.order import Ordered, keep_order
 from o3d_relief.bounds.pairs import Pairs, close_pairs
 from o3d_relief.bounds.silhouettes import silhouette_pairs
-from o3d_relief.bounds.stiffness import Stiffness
 from o3d_relief.linalg.laplacian import vertex_areas
 from o3d_relief.params import ReliefParams
 from o3d_relief.progress import Tick, silent
-from o3d_relief.records import AttenuationStage, OrderStage, RestorationStage
+from o3d_relief.records import OrderStage, RestorationStage
 from o3d_relief.steps import on_plane, ratios
 
 __all__ = ["order_step"]
@@ -33,7 +33,8 @@ def order_step(
     visible: NDArray[np.bool_],
     laplacian: sp.csr_array,
     restored: RestorationStage,
-    points: AttenuationStage,
+    around: NearPoints,
+    lines: Lines,
     pairs: Pairs | None,
     params: ReliefParams,
     unit: float,
@@ -47,7 +48,7 @@ def order_step(
     # The compression comes later and shrinks gaps, at most by its smallest ratio.
     ratio, lowest = ratios(z, params, unit)
     min_gap = params.min_gap / unit / (0.95 * lowest if ratio < 1.0 else 1.0)
-    pairs = Pairs.join([pairs, _further_pairs(vertices, faces, min_gap)])
+    pairs = Pairs.join([pairs, _further_pairs(vertices, faces, lines, min_gap)])
     areas = vertex_areas(vertices, faces)
     front = visible if params.in_front else None
 
@@ -57,10 +58,9 @@ def order_step(
     if restored.stiffness == 0.0:
         ordered = ordered_with(laplacian)
     else:
-        stiff = Stiffness(vertices, faces, points.kept_index)
         for stiffer in _STIFFER:
-            ordered = ordered_with(stiff.added_to(laplacian, restored.stiffness * stiffer))
-            near, elsewhere = bend_of(vertices, ordered.z, faces, visible, points.kept_index)
+            ordered = ordered_with(around.stiffness.added_to(laplacian, restored.stiffness * stiffer))
+            near, elsewhere = around.bends.most(ordered.z)
             if ordered.rounds == 0 or near <= elsewhere:
                 break
     counts = {
@@ -72,10 +72,13 @@ def order_step(
     return OrderStage(z=on_plane(ordered.z), counts=counts)
 
 
-def _further_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64], min_gap: float) -> Pairs:
+def _further_pairs(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], lines: Lines, min_gap: float
+) -> Pairs:
     """Pair what is stacked elsewhere than at vertices, and what is very close to them.
 
     For a smallest gap, which need not be least at vertices and silhouettes, the grid is a fine one.
     """
-    grid = grid_pairs(vertices, faces, side=_LINES if min_gap == 0.0 else 4 * _LINES)
-    return Pairs.join([silhouette_pairs(vertices, faces), close_pairs(vertices, faces), grid])
+    grid = grid_pairs(vertices, faces, side=_LINES if min_gap == 0.0 else 4 * _LINES, lines=lines)
+    close = close_pairs(vertices, faces, lines=lines)
+    return Pairs.join([silhouette_pairs(vertices, faces), close, grid])

@@ -8,6 +8,8 @@ import open3d as o3d
 
 from o3d_relief.attenuation_step import attenuation_step
 from o3d_relief.bounded_step import bounded_step
+from o3d_relief.bounds.lines import Lines
+from o3d_relief.bounds.near_points import NearPoints
 from o3d_relief.errors import MeshError, ParameterError
 from o3d_relief.journal import Journal, OnStage
 from o3d_relief.linalg.laplacian import cotangent_laplacian
@@ -124,16 +126,18 @@ def make_relief(
         journal.begin("attenuation")
         points = journal.keep(attenuation_step(vertices, visible, scene, clusters, params))
         journal.begin("construction")
-        pairs = stacked_pairs(vertices, faces, params)
+        lines = Lines(vertices, faces)
+        pairs = stacked_pairs(lines, params)
         z = journal.keep(
             construction_step(
                 vertices, faces, visible, laplacian, slivers, clusters, points, pairs, tick=journal.tick
             )
         ).z
         journal.begin("restoration")
+        around = NearPoints(vertices, faces, visible, points.kept_index)
         restored = journal.keep(
             restoration_step(
-                vertices, faces, visible, laplacian, z, clusters, points, params, tick=journal.tick
+                vertices, visible, laplacian, z, clusters, points, around, params, tick=journal.tick
             )
         )
         journal.begin("order")
@@ -143,7 +147,8 @@ def make_relief(
             visible,
             laplacian,
             restored,
-            points,
+            around,
+            lines,
             pairs,
             params,
             scene.unit,

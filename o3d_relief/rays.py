@@ -26,7 +26,8 @@ def unit_box(
     size : float
         The point p lies at (p - middle) / size in the scene.
     """
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    axes = np.ascontiguousarray(vertices.T)
+    low, high = axes.min(axis=1), axes.max(axis=1)
     middle, size = (low + high) / 2, float((high - low).max())
     scene = o3d.t.geometry.RaycastingScene()
     scene.add_triangles(

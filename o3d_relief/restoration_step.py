@@ -9,8 +9,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from o3d_relief.bounds.bends import bend_of
-from o3d_relief.bounds.stiffness import Stiffness
+from o3d_relief.bounds.near_points import NearPoints
 from o3d_relief.params import ReliefParams
 from o3d_relief.progress import Tick, silent
 from o3d_relief.records import AttenuationStage, ClustersStage, RestorationStage
@@ -38,12 +37,12 @@ _ROOM = 0.9
 
 def restoration_step(
     vertices: NDArray[np.float64],
-    faces: NDArray[np.int64],
     visible: NDArray[np.bool_],
     laplacian: sp.csr_array,
     z: NDArray[np.float64],
     clusters: ClustersStage,
     points: AttenuationStage,
+    around: NearPoints,
     params: ReliefParams,
     *,
     tick: Tick = silent,
@@ -68,14 +67,13 @@ def restoration_step(
     if not params.smooth_points:
         restored = again(laplacian, z, high, index, label)
     else:
-        stiff = Stiffness(vertices, faces, index)
         for stiffness in _STIFFNESS:
-            form = stiff.added_to(laplacian, stiffness)
+            form = around.stiffness.added_to(laplacian, stiffness)
             restored = again(form, z, high, index, label)
-            near, elsewhere = bend_of(vertices, restored.z, faces, visible, index)
+            near, elsewhere = around.bends.most(restored.z)
             if near <= _ROOM * elsewhere:
                 break
-            high = high | stiff.within  # large faces reach further than the discs
+            high = high | around.stiffness.within  # large faces reach further than the discs
     counts |= {
         "solved": int(restored.solved.sum()),
         "points_held": restored.points_held,

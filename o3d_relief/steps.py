@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from o3d_relief.attenuation_step import beta_of_clusters
+from o3d_relief.bounds.lines import Lines
 from o3d_relief.bounds.pairs import Pairs, vertex_pairs
 from o3d_relief.bounds.parts import tie_parts
 from o3d_relief.errors import MeshError, ParameterError
@@ -127,11 +128,9 @@ def _behind(z: NDArray[np.float64], visible: NDArray[np.bool_]) -> int:
     return int((z[visible] < 0.0).sum())
 
 
-def stacked_pairs(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], params: ReliefParams
-) -> Pairs | None:
+def stacked_pairs(lines: Lines, params: ReliefParams) -> Pairs | None:
     """Find what must keep its order at the vertices; None where the order is not kept."""
-    return vertex_pairs(vertices, faces) if params.in_order else None
+    return vertex_pairs(lines.vertices, lines.faces, lines=lines) if params.in_order else None
 
 
 def construction_step(

@@ -1,7 +1,7 @@
 import numpy as np
 
 import o3d_relief as rel
-from o3d_relief.bounds.bends import bend_of
+from o3d_relief.bounds.near_points import NearPoints
 from shapes import bust, grid, joined, moved, to_mesh
 
 
@@ -21,9 +21,8 @@ def test_corrections_bend_the_surface_elsewhere_than_at_the_points():
     assert s["order"].counts["pairs_corrected"] > 0
     assert s["order"].counts["left"] == 0
     points = s["attenuation"].kept_index
-    near, elsewhere = bend_of(
-        s["perspective"].vertices, s["order"].z, s["scene"].faces, s["visibility"].visible, points
-    )
+    around = NearPoints(s["perspective"].vertices, s["scene"].faces, s["visibility"].visible, points)
+    near, elsewhere = around.bends.most(s["order"].z)
     assert near <= elsewhere
     assert relief.certificate.failures == []
 

@@ -1,14 +1,15 @@
 import pytest
 
 import o3d_relief as rel
-from o3d_relief.bounds.bends import bend_of
+from o3d_relief.bounds.near_points import NearPoints
 from shapes import bust, to_mesh
 
 
 def _bends(relief, stage):
     s = relief.stages
     vertices, faces = s["perspective"].vertices, s["scene"].faces
-    return bend_of(vertices, s[stage].z, faces, s["visibility"].visible, s["attenuation"].kept_index)
+    around = NearPoints(vertices, faces, s["visibility"].visible, s["attenuation"].kept_index)
+    return around.bends.most(s[stage].z)
 
 
 @pytest.mark.parametrize("beta", [0.05, 0.8])

@@ -4,78 +4,69 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
-__all__ = ["bend_of", "normal_changes"]
+__all__ = ["Bends"]
 
 _NEAR = 1.0
 """A face is near an attenuation point within this distance, in relief units."""
 
 
-def normal_changes(
-    before: NDArray[np.float64],
-    after: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    visible: NDArray[np.bool_],
-    points: NDArray[np.int64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Measure how far the normals of visible faces have turned.
-
-    Parameters
-    ----------
-    before, after : (n, 3) float64
-    faces : (m, 3) int64
-    visible : (n,) bool
-    points : (q,) int64
-        The kept attenuation points.
-
-    Returns
-    -------
-    near, elsewhere : (a,), (b,) float64
-        Angles in degrees, near the points and elsewhere; faces without an area are left out.
-    """
-    seen = faces[visible[faces].all(axis=1)]
-    one, other = _normals(before[seen]), _normals(after[seen])
-    sizes = np.linalg.norm(one, axis=1) * np.linalg.norm(other, axis=1)
-    cosine = (one * other).sum(axis=1)[sizes > 0.0] / sizes[sizes > 0.0]
-    angle = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
-    middle = before[seen[sizes > 0.0]].mean(axis=1)
-    distance, _ = cKDTree(before[points]).query(middle, distance_upper_bound=2.0 * _NEAR)
-    return angle[distance <= _NEAR], angle[distance > _NEAR]
-
-
-def bend_of(
-    vertices: NDArray[np.float64],
-    z: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    visible: NDArray[np.bool_],
-    points: NDArray[np.int64],
-) -> tuple[float, float]:
-    """Return the 99th percentile of the angles of `normal_changes`, near the points and elsewhere.
+class Bends:
+    """Measures how far the normals of visible faces turn where only z moves.
 
     Parameters
     ----------
     vertices : (n, 3) float64
         Before.
-    z : (n,) float64
-        Heights after.
     faces : (m, 3) int64
     visible : (n,) bool
-    points : (q,) int64
-
-    Returns
-    -------
-    near, elsewhere : float
-        In degrees; 0 where there are no faces.
+    distance : (m,) float64
+        Of the middle of each face from the attenuation points, in relief units.
     """
-    after = np.column_stack([vertices[:, :2], z])
-    near, elsewhere = normal_changes(vertices, after, faces, visible, points)
-    return _most(near), _most(elsewhere)
 
+    def __init__(
+        self,
+        vertices: NDArray[np.float64],
+        faces: NDArray[np.int64],
+        visible: NDArray[np.bool_],
+        distance: NDArray[np.float64],
+    ) -> None:
+        a, b, c = faces.T
+        seen = np.flatnonzero(visible[a] & visible[b] & visible[c])
+        x, y, z = np.ascontiguousarray(vertices.T)
+        self._corners = a, b, c = np.ascontiguousarray(faces.take(seen, axis=0).T)
+        self._sides = x[b] - x[a], y[b] - y[a], x[c] - x[a], y[c] - y[a]
+        self._before = self._normals(z)
+        self._near = distance[seen] <= _NEAR
 
-def _most(angles: NDArray[np.float64]) -> float:
-    return float(np.percentile(angles, 99)) if len(angles) else 0.0
+    def _normals(self, z: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+        """Return the normals of the faces, as long as twice their areas, and their lengths."""
+        a, b, c = self._corners
+        (ux, uy, vx, vy), uz, vz = self._sides, z[b] - z[a], z[c] - z[a]
+        normal = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        return *normal, np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
 
+    def angles(self, z: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Measure how far the normals have turned for the heights z (n,).
 
-def _normals(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        Returns
+        -------
+        near, elsewhere : (a,), (b,) float64
+            Angles in degrees, near the points and elsewhere; faces without an area are left out.
+        """
+        *one, size = self._before
+        *other, new_size = self._normals(z)
+        sizes = size * new_size
+        dot = one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
+        near, elsewhere = (
+            np.degrees(np.arccos(np.clip(dot[chosen] / sizes[chosen], -1.0, 1.0)))
+            for chosen in (self._near & (sizes > 0.0), ~self._near & (sizes > 0.0))
+        )
+        return near, elsewhere
+
+    def most(self, z: NDArray[np.float64]) -> tuple[float, float]:
+        """Return the 99th percentiles of both `angles`, 0 where there are no faces."""
+        near, elsewhere = (
+            float(np.percentile(angles, 99)) if len(angles) else 0.0 for angles in self.angles(z)
+        )
+        return near, elsewhere

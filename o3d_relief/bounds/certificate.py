@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from o3d_relief.bounds.bends import normal_changes
 from o3d_relief.bounds.crossings import crossings, edges_of
 from o3d_relief.bounds.grid import grid_pairs
 from o3d_relief.bounds.inversions import inversions
-from o3d_relief.bounds.lines import upright
+from o3d_relief.bounds.lines import Lines, upright
+from o3d_relief.bounds.near_points import NearPoints
 from o3d_relief.bounds.origin import Origin
 from o3d_relief.bounds.pairs import vertex_pairs
 from o3d_relief.bounds.places import Place, behind_places, crossing_places, told
@@ -148,15 +148,17 @@ def certify(
     origin = Origin(relief_faces, relief_parents, scene)
     # Pairs leave out what stands upright in the relief, and here also what did so in the scene.
     lying = relief_faces[~upright(before, relief_faces)]
-    low, high = scene.min(axis=0), scene.max(axis=0)
-    stacked = vertex_pairs(relief, lying), grid_pairs(relief, lying, low=low, high=high)
+    low, high, lines = scene.min(axis=0), scene.max(axis=0), Lines(relief, lying)
+    stacked = (
+        vertex_pairs(relief, lying, lines=lines),
+        grid_pairs(relief, lying, low=low, high=high, lines=lines),
+    )
     both = [inversions(relief, pairs, relief_before, origin, min_gap=min_gap) for pairs in stacked]
     edges = edges_of(relief_faces)
     met = crossings(relief, relief_faces, edges)
     met = met.select(met.pierced(relief[:, 2]))
     old = met.pierced(relief_before) | origin.crossed(met.edge[:, [0, 1, 1]], met.face)
-    after = np.column_stack([scene[:, :2], heights])
-    near, elsewhere = normal_changes(scene, after, scene_faces, visible, points)
+    near, elsewhere = NearPoints(scene, scene_faces, visible, points).bends.angles(heights)
     return Certificate(
         visible_tested=int(visible.sum()),
         visible_behind=int((heights[visible] < 0.0).sum()),

@@ -105,11 +105,12 @@ class Crossings:
 
     def select(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Crossings:
         """Return some of them, by a mask or by number."""
+        number = np.flatnonzero(chosen) if chosen.dtype == bool else chosen
         return Crossings(
-            edge=self.edge[chosen],
-            face=self.face[chosen],
-            along=self.along[chosen],
-            inside=self.inside[chosen],
+            edge=self.edge.take(number, axis=0),
+            face=self.face.take(number, axis=0),
+            along=self.along.take(number, axis=0),
+            inside=self.inside.take(number, axis=0),
         )
 
 
@@ -184,11 +185,13 @@ def crossings(vertices: NDArray[np.float64], faces: NDArray[np.int64], edges: ND
     if len(edges) == 0:  # all that is left of the relief has shrunk to lines
         return _stretches(vertices[:, :2], edges[none], faces[none])
     scene, middle, size = unit_box(vertices, faces)
-    start, end = vertices[edges[:, 0]], vertices[edges[:, 1]]
-    rays = np.concatenate([(start - middle) / size, (end - start) / size], axis=1).astype(np.float32)
-    # Whether a ray meets anything between its ends is known fast; where, takes its whole line.
-    meets = scene.test_occlusions(o3d.core.Tensor(rays), tnear=_INSIDE, tfar=1.0 - _INSIDE).numpy()
-    candidates = np.flatnonzero(meets)
+    places = (vertices - middle) / size
+    rays = _rays(places, edges)
+    # Whether a ray meets anything between its ends is known fast; where, takes its whole line. One in six
+    # meets the triangles of its own edge, by a rounding error: most of these do not on the way back.
+    candidates = np.flatnonzero(_meets(scene, rays))
+    if len(candidates):
+        candidates = candidates[_meets(scene, _rays(places, edges[candidates][:, ::-1]))]
     if len(candidates) == 0:  # Open3D dies of a list without rays
         return _stretches(vertices[:, :2], edges[none], faces[none])
     hits = scene.list_intersections(o3d.core.Tensor(rays[candidates]))
@@ -199,6 +202,18 @@ def crossings(vertices: NDArray[np.float64], faces: NDArray[np.int64], edges: ND
     edge, face = edges[ray[inside]], faces[triangle[inside]]
     apart = (edge[:, :, None] != face[:, None, :]).all(axis=(1, 2))
     return _stretches(vertices[:, :2], edge[apart], face[apart])
+
+
+def _rays(places: NDArray[np.float64], edges: NDArray[np.int64]) -> NDArray[np.float32]:
+    """Return rays along edges, from 0 to 1."""
+    start, end = places.take(edges[:, 0], axis=0), places.take(edges[:, 1], axis=0)
+    return np.concatenate([start, end - start], axis=1, dtype=np.float32)
+
+
+def _meets(scene: o3d.t.geometry.RaycastingScene, rays: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Tell which rays meet anything between their ends."""
+    hits = scene.test_occlusions(o3d.core.Tensor(rays), tnear=_INSIDE, tfar=1.0 - _INSIDE)
+    return np.asarray(hits.numpy())
 
 
 def _stretches(plane: NDArray[np.float64], edge: NDArray[np.int64], face: NDArray[np.int64]) -> Crossings:
@@ -251,6 +266,11 @@ def around(
         Among the edges of all triangles that share a vertex with one of the two, and the triangles that
         share a vertex with the other.
     """
+    here = np.zeros(len(vertices), dtype=bool)
+    here[found.edge] = True
+    here[found.face] = True
+    a, b, c = faces.T
+    faces = faces[here[a] | here[b] | here[c]]
     n, m = len(vertices), len(faces)
     entries = np.ones(faces.size, dtype=bool), (faces.ravel(), np.repeat(np.arange(m), 3))
     beside = sp.csr_array(entries, shape=(n, m))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from o3d_relief.bounds.lines import UP, Borders, UnitBox, upright, weights_of
+from o3d_relief.bounds.lines import UP, Lines, weights_of
 from o3d_relief.bounds.pairs import Pairs, next_to_each_other
 
 __all__ = ["grid_pairs"]
@@ -21,6 +21,7 @@ def grid_pairs(
     side: int = 1024,
     low: NDArray[np.float64] | None = None,
     high: NDArray[np.float64] | None = None,
+    lines: Lines | None = None,
 ) -> Pairs:
     """Pair the points that follow each other on the lines of a regular grid.
 
@@ -33,6 +34,8 @@ def grid_pairs(
         Number of lines along x and along y.
     low, high : (3,) float64, optional
         Corners of the box that the grid covers, that of the vertices where omitted.
+    lines : Lines, optional
+        Those of this mesh, where others cast them, too.
 
     Returns
     -------
@@ -40,10 +43,10 @@ def grid_pairs(
         Neighbours on the surface, which meet where the line passes, are left out. The gap of surfaces that
         touch is known to a rounding error only, and may be a little less than 0.
     """
-    faces = faces[~upright(vertices, faces)]
-    if len(faces) == 0:
+    lines = Lines(vertices, faces) if lines is None else lines
+    if len(lines.faces) == 0:
         return Pairs.join([])
-    box = UnitBox(vertices, faces)
+    box, faces = lines.box, lines.faces
     low = vertices.min(axis=0) if low is None else low
     high = vertices.max(axis=0) if high is None else high
     steps = (np.arange(side) + 0.5) / side
@@ -54,7 +57,7 @@ def grid_pairs(
     hits = box.scene.list_intersections(box.rays(start, UP))
     triangle = hits["primitive_ids"].numpy().astype(np.int64)
     weights = weights_of(hits["primitive_uvs"].numpy())
-    usable = np.flatnonzero(~Borders(vertices, faces).grazed(triangle, weights))
+    usable = np.flatnonzero(~lines.borders.grazed(triangle, weights))
     triangle, weights = triangle[usable], weights[usable]
     line = hits["ray_ids"].numpy()[usable].astype(np.int64)
     t = hits["t_hit"].numpy()[usable].astype(np.float64)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
 from o3d_relief.rays import unit_box
 
-__all__ = ["MISS", "SAME_PLACE", "UP", "Borders", "UnitBox", "upright", "weights_of"]
+__all__ = ["MISS", "SAME_PLACE", "UP", "Borders", "Lines", "UnitBox", "upright", "weights_of"]
 
 SAME_PLACE = 5e-4
 """Points of a line that are closer than this, in relief units, are one: rays are cast in float32."""
@@ -63,24 +65,32 @@ class Borders:
         alone[1:] &= ~same
         alone[:-1] &= ~same
         single = ordered[alone]
-        place = np.minimum(np.searchsorted(single, edge), max(len(single) - 1, 0))
-        self._on_border = single[place].T == edge.T if len(single) else np.zeros(faces.shape, dtype=bool)
         at_border = np.zeros(n, dtype=bool)
         at_border[single // n] = True
         at_border[single % n] = True
-        self._corner_on_border = at_border[faces]
+        self._on_border = at_border[start] & at_border[end]
+        likely = edge[self._on_border]
+        place = np.minimum(np.searchsorted(single, likely), max(len(single) - 1, 0))
+        self._on_border[self._on_border] = single[place] == likely
+        self._corner_on_border = at_border[corners]
         x, y = np.ascontiguousarray(vertices[:, :2].T)
         across, along = x[end] - x[start], y[end] - y[start]
         area = np.abs(across[0] * along[1] - along[0] * across[1])
         opposite = np.sqrt(across**2 + along**2)
-        self._height = (area / np.maximum(opposite, np.finfo(np.float64).tiny)).T
+        self._height = area / np.maximum(opposite, np.finfo(np.float64).tiny)
 
     def grazed(self, triangle: NDArray[np.int64], weights: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Tell which points of triangles, (q,) and (q, 3), lie on a border, to a rounding error."""
-        near = weights * self._height[triangle] < 2 * SAME_PLACE
-        at_corner = near.sum(axis=1, keepdims=True) - near == 2
-        grazed = (near & self._on_border[triangle]) | (at_corner & self._corner_on_border[triangle])
-        return np.asarray(grazed.any(axis=1))
+        near = [
+            own * height[triangle] < 2 * SAME_PLACE
+            for own, height in zip(weights.T, self._height, strict=True)
+        ]
+        grazed = np.zeros(len(triangle), dtype=bool)
+        for side in range(3):
+            at_corner = near[side - 2] & near[side - 1]
+            grazed |= near[side] & self._on_border[side][triangle]
+            grazed |= at_corner & self._corner_on_border[side][triangle]
+        return grazed
 
 
 class UnitBox:
@@ -95,6 +105,44 @@ class UnitBox:
         rays[:, :3] = (origins - self.middle) / self.size
         rays[:, 3:] = direction
         return o3d.core.Tensor(rays)
+
+
+class Lines:
+    """What lines along z meet in points: the faces of a mesh that do not stand upright.
+
+    Everything is made when it is needed, and once for all who cast lines through the mesh.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+        In the relief frame, in relief units.
+    faces : (m, 3) int64
+
+    Attributes
+    ----------
+    vertices : (n, 3) float64
+    faces : (l, 3) int64
+    box : UnitBox
+    borders : Borders
+    """
+
+    def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
+        self.vertices, self._all = vertices, faces
+
+    @cached_property
+    def faces(self) -> NDArray[np.int64]:
+        """The faces that do not stand upright."""
+        return self._all[~upright(self.vertices, self._all)]
+
+    @cached_property
+    def box(self) -> UnitBox:
+        """Their scene."""
+        return UnitBox(self.vertices, self.faces)
+
+    @cached_property
+    def borders(self) -> Borders:
+        """Their borders."""
+        return Borders(self.vertices, self.faces)
 
 
 def weights_of(uv: NDArray[np.float32]) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from o3d_relief.bounds.crossings import Crossings, crossings, edges_of
 from o3d_relief.bounds.grid import grid_pairs
-from o3d_relief.bounds.lines import upright
+from o3d_relief.bounds.lines import Lines, upright
 from o3d_relief.bounds.origin import Origin
 from o3d_relief.bounds.pairs import Pairs, foot_pairs, vertex_pairs
 from o3d_relief.bounds.rows import gap_rows
@@ -101,8 +101,10 @@ class BetweenLines:
         known = origin.crossed(met.edge[:, [0, 1, 1]], met.face)
         lying = cut.faces[~upright(np.column_stack([cut.vertices[:, :2], before]), cut.faces)]
         low, high = self._vertices.min(axis=0), self._vertices.max(axis=0)
-        stacked = vertex_pairs(cut.vertices, lying), grid_pairs(cut.vertices, lying, low=low, high=high)
-        turned = _turned(Pairs.join(list(stacked)), before)
+        lines = Lines(cut.vertices, lying)
+        at_vertices = vertex_pairs(cut.vertices, lying, lines=lines)
+        on_grid = grid_pairs(cut.vertices, lying, low=low, high=high, lines=lines)
+        turned = _turned(Pairs.join([at_vertices, on_grid]), before)
         turned = turned.select(~origin.crossed(turned.upper, turned.lower))
         found = Pairs.join([met.select(~known).pairs(before, after), turned])
         return (gap_rows(found, len(first)) @ carry).tocsr(), found.gap

@@ -184,6 +184,7 @@ class _BetweenLines:
     ) -> None:
         self._vertices, self._faces = vertices, faces
         self._edges, self._raster = edges_of(faces), Raster(vertices, faces)
+        self._corners, self._ends = np.ascontiguousarray(faces.T), np.ascontiguousarray(self._edges.T)
         self._last = np.full(len(vertices), np.nan)
         self._parted = Parted(vertices, faces, laplacian, self._raster)
 
@@ -192,18 +193,21 @@ class _BetweenLines:
         vertices, faces = self._vertices, self._faces
         moved = z != self._last
         self._last = z
-        changed = moved[faces].any(axis=1)
+        a, b, c = self._corners
+        changed = moved[a] | moved[b] | moved[c]
         near = np.ones(len(faces), dtype=bool) if changed.all() else self._raster.over_or_under(changed)
         at = np.zeros(len(z), dtype=bool)
         at[faces[near]] = True
-        edges = self._edges[at[self._edges].all(axis=1)]
+        first, last = self._ends
+        edges = self._edges[at[first] & at[last]]
         # Edges that moved may pierce what lies near; the others, triangles that moved.
-        own = moved[edges].any(axis=1)
+        own = moved[edges[:, 0]] | moved[edges[:, 1]]
         looked = [new_crossings(vertices, faces[near], edges[own], z)]
         if not own.all():
             looked.append(new_crossings(vertices, faces[changed], edges[~own], z))
-        cut = (z[faces].min(axis=1) < 0.0) & (z[faces].max(axis=1) > 0.0)
-        at_foot = foot_pairs(vertices, faces[near & self._raster.over_or_under(cut & near)], edges, z)
+        in_front, behind = z > 0.0, z < 0.0
+        cut = near & (in_front[a] | in_front[b] | in_front[c]) & (behind[a] | behind[b] | behind[c])
+        at_foot = foot_pairs(vertices, faces[near & self._raster.over_or_under(cut)], edges, z)
         found = Pairs.join([*(pairs for pairs, _ in looked), at_foot])
         return found, sum(count for _, count in looked) + len(at_foot)
 
@@ -221,6 +225,7 @@ class _Lines:
 
     def __init__(self, pairs: Pairs, n: int, min_gap: float) -> None:
         self._pairs, self._min_gap = pairs, min_gap
+        self._corners = np.concatenate([pairs.upper.T, pairs.lower.T])
         self._held = np.zeros(len(pairs), dtype=bool)
         self._ever, self._again = self._held.copy(), self._held.copy()
         self._last = np.full(n, np.nan)
@@ -234,7 +239,10 @@ class _Lines:
         """Find what is wrong now; only pairs of which a vertex has moved can have changed."""
         moved = z != self._last
         self._last = z
-        changed = np.flatnonzero(moved[self._pairs.upper].any(axis=1) | moved[self._pairs.lower].any(axis=1))
+        of_moved = np.zeros(len(self._pairs), dtype=bool)
+        for corner in self._corners:
+            of_moved |= moved[corner]
+        changed = np.flatnonzero(of_moved)
         self.wrong[changed] = out_of_order(self._pairs.select(changed), z, min_gap=self._min_gap)
 
     def let_go(self, z: NDArray[np.float64]) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from o3d_relief.bounds.lines import MISS, SAME_PLACE, UP, Borders, UnitBox, upright, weights_of
+from o3d_relief.bounds.lines import MISS, SAME_PLACE, UP, Lines, upright, weights_of
 
 __all__ = ["Pairs", "as_points", "close_pairs", "foot_pairs", "next_to_each_other", "vertex_pairs"]
 
@@ -50,12 +50,14 @@ class Pairs:
 
     def select(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Pairs:
         """Return some of the pairs, by a mask or by number."""
+        # ndarray.take copies whole rows; with brackets it takes four times as long.
+        number = np.flatnonzero(chosen) if chosen.dtype == bool else chosen
         return Pairs(
-            upper=self.upper[chosen],
-            upper_weights=self.upper_weights[chosen],
-            lower=self.lower[chosen],
-            lower_weights=self.lower_weights[chosen],
-            gap=self.gap[chosen],
+            upper=self.upper.take(number, axis=0),
+            upper_weights=self.upper_weights.take(number, axis=0),
+            lower=self.lower.take(number, axis=0),
+            lower_weights=self.lower_weights.take(number, axis=0),
+            gap=self.gap.take(number),
         )
 
     def difference(self, n: int) -> sp.csr_array:
@@ -94,7 +96,9 @@ class Pairs:
         )
 
 
-def vertex_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Pairs:
+def vertex_pairs(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], *, lines: Lines | None = None
+) -> Pairs:
     """Pair each vertex with the next surface above and below it.
 
     Parameters
@@ -102,26 +106,24 @@ def vertex_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Pai
     vertices : (n, 3) float64
         In the relief frame, in relief units.
     faces : (m, 3) int64
+    lines : Lines, optional
+        Those of this mesh, where others cast them, too.
 
     Returns
     -------
     Pairs
         At most 2 n; those closer than 1e-3 relief units are left out.
     """
-    faces = faces[~upright(vertices, faces)]
-    if len(faces) == 0:
+    lines = Lines(vertices, faces) if lines is None else lines
+    if len(lines.faces) == 0:
         return Pairs.join([])
     everything = np.arange(len(vertices))
-    box, borders = UnitBox(vertices, faces), Borders(vertices, faces)
-    return Pairs.join(
-        [
-            _next_pairs(vertices, faces, box, borders, everything, 2 * SAME_PLACE * direction)
-            for direction in (UP, -UP)
-        ]
-    )
+    return Pairs.join([_next_pairs(lines, everything, 2 * SAME_PLACE * direction) for direction in (UP, -UP)])
 
 
-def close_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Pairs:
+def close_pairs(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], *, lines: Lines | None = None
+) -> Pairs:
     """Pair each vertex with the surfaces that are too close to it for `vertex_pairs`, but do not touch it.
 
     Parameters
@@ -129,47 +131,43 @@ def close_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Pair
     vertices : (n, 3) float64
         In the relief frame, in relief units.
     faces : (m, 3) int64
+    lines : Lines, optional
+        Those of this mesh, where others cast them, too.
 
     Returns
     -------
     Pairs
         With gaps between 5e-4 and about 1e-3 relief units.
     """
-    faces = faces[~upright(vertices, faces)]
-    if len(faces) == 0:
+    lines = Lines(vertices, faces) if lines is None else lines
+    if len(lines.faces) == 0:
         return Pairs.join([])
-    box, borders = UnitBox(vertices, faces), Borders(vertices, faces)
-    found = []
+    box, found = lines.box, []
     for direction in (UP, -UP):
         step = 0.1 * SAME_PLACE * direction
         rays = box.rays(vertices + step, direction)
         reach = 2.2 * SAME_PLACE / box.size
         candidates = np.flatnonzero(box.scene.test_occlusions(rays, tfar=reach).numpy())
         if len(candidates):
-            close = _next_pairs(vertices, faces, box, borders, candidates, step)
+            close = _next_pairs(lines, candidates, step)
             found.append(close.select((close.gap > SAME_PLACE) & (close.gap < 2.2 * SAME_PLACE)))
     return Pairs.join(found)
 
 
-def _next_pairs(
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    box: UnitBox,
-    borders: Borders,
-    chosen: NDArray[np.int64],
-    step: NDArray[np.float64],
-) -> Pairs:
+def _next_pairs(lines: Lines, chosen: NDArray[np.int64], step: NDArray[np.float64]) -> Pairs:
     """Pair chosen vertices with the next surface in the direction of a step, from there on."""
+    vertices, faces = lines.vertices, lines.faces
     direction = np.sign(step)
-    hits = box.scene.cast_rays(box.rays(vertices[chosen] + step, direction))
+    hits = lines.box.scene.cast_rays(lines.box.rays(vertices[chosen] + step, direction))
     met = np.flatnonzero(hits["primitive_ids"].numpy() != MISS)
     triangle = hits["primitive_ids"].numpy()[met].astype(np.int64)
     other_weights = weights_of(hits["primitive_uvs"].numpy()[met])
-    hit = chosen[met]
+    hit, other = chosen[met], faces.take(triangle, axis=0)
     # A ray may meet a steep triangle of its own vertex.
-    usable = (faces[triangle] != hit[:, None]).all(axis=1) & ~borders.grazed(triangle, other_weights)
-    hit, other, other_weights = hit[usable], faces[triangle[usable]], other_weights[usable]
-    own, own_weights = as_points(hit)
+    elsewhere = (other[:, 0] != hit) & (other[:, 1] != hit) & (other[:, 2] != hit)
+    usable = np.flatnonzero(elsewhere & ~lines.borders.grazed(triangle, other_weights))
+    other, other_weights = other.take(usable, axis=0), other_weights.take(usable, axis=0)
+    own, own_weights = as_points(hit[usable])
     if direction[2] > 0:
         return next_to_each_other(vertices[:, 2], other, other_weights, own, own_weights)
     return next_to_each_other(vertices[:, 2], own, own_weights, other, other_weights)
@@ -199,22 +197,21 @@ def foot_pairs(
     Pairs
         Those that changed places; upper and lower as they were before.
     """
-    lying = faces[~upright(np.column_stack([vertices[:, :2], z]), faces) & ~upright(vertices, faces)]
-    edges = edges[z[edges].prod(axis=1) < 0.0]
-    if len(edges) == 0 or len(lying) == 0:
+    edges = edges.compress(z[edges[:, 0]] * z[edges[:, 1]] < 0.0, axis=0)
+    moved = np.column_stack([vertices[:, :2], z])
+    lines = Lines(moved, faces[~upright(vertices, faces)] if len(edges) else faces[:0])
+    if len(lines.faces) == 0:
         return Pairs.join([])
     share = z[edges[:, 0]] / (z[edges[:, 0]] - z[edges[:, 1]])
     foot = vertices[edges[:, 0]] + share[:, None] * (vertices[edges[:, 1]] - vertices[edges[:, 0]])
     foot[:, 2] = 2 * SAME_PLACE
-    moved = np.column_stack([vertices[:, :2], z])
-    box, borders = UnitBox(moved, lying), Borders(moved, lying)
-    hits = box.scene.cast_rays(box.rays(foot, UP))
+    hits = lines.box.scene.cast_rays(lines.box.rays(foot, UP))
     hit = np.flatnonzero(hits["primitive_ids"].numpy() != MISS)
     triangle = hits["primitive_ids"].numpy()[hit].astype(np.int64)
     weights = weights_of(hits["primitive_uvs"].numpy()[hit])
-    own = (lying[triangle][:, :, None] == edges[hit][:, None, :]).any(axis=1).all(axis=1)
-    usable = ~own & ~borders.grazed(triangle, weights)
-    hit, other, other_weights = hit[usable], lying[triangle[usable]], weights[usable]
+    own = (lines.faces[triangle][:, :, None] == edges[hit][:, None, :]).any(axis=1).all(axis=1)
+    usable = ~own & ~lines.borders.grazed(triangle, weights)
+    hit, other, other_weights = hit[usable], lines.faces[triangle[usable]], weights[usable]
     corners = edges[hit][:, [0, 1, 1]]
     at_foot = np.stack([1.0 - share[hit], share[hit], np.zeros(len(hit))], axis=1)
     return next_to_each_other(vertices[:, 2], corners, at_foot, other, other_weights)

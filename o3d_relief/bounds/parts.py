@@ -157,12 +157,13 @@ def find_springs(
     n = len(vertices)
     apart = pairs.select(label[pairs.upper[:, 0]] != label[pairs.lower[:, 0]])
     touching = touching_pairs(vertices, faces, label, _TOUCH)
-    everything = laplacian + apart.difference(n).T @ apart.difference(n)
-    everything = everything + touching.difference(n).T @ touching.difference(n)
+    rows = [apart.difference(n), touching.difference(n)]
+    everything = laplacian + rows[0].T @ rows[0]
+    everything = everything + rows[1].T @ rows[1]
     strays = _nearest_outside(vertices, *connected_components(everything, directed=False))
     ends = [np.stack([some.upper[:, 0], some.lower[:, 0]], axis=1) for some in (apart, touching)]
     return PartSprings(
-        rows=sp.vstack([apart.difference(n), touching.difference(n), _edge_rows(strays, n)]).tocsr(),
+        rows=sp.vstack([*rows, _edge_rows(strays, n)]).tocsr(),
         stiffness=np.repeat(
             [across_gaps, _IN_CONTACT, _IN_CONTACT], [len(apart), len(touching), len(strays)]
         ),

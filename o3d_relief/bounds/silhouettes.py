@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from o3d_relief.bounds.aligned import APART, aligned_pairs, footprints
-from o3d_relief.bounds.crossings import cross, edges_of
+from o3d_relief.bounds.aligned import APART, aligned_pairs
+from o3d_relief.bounds.footprints import footprints
 from o3d_relief.bounds.pairs import Pairs
 
 __all__ = ["silhouette_pairs", "silhouettes"]
@@ -41,17 +41,29 @@ def silhouettes(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDAr
         Edges of one face or of more than two, those whose two faces lie on the same side, and those of faces
         that stand upright.
     """
-    start, end, opposite = faces[:, _CORNERS].transpose(2, 0, 1).reshape(3, -1)
-    low, high = np.minimum(start, end), np.maximum(start, end)
-    plane = vertices[:, :2]
-    side = np.sign(cross(plane[high] - plane[low], plane[opposite] - plane[low]))
-    edge = low * len(vertices) + high
-    order = np.argsort(edge, kind="stable")
-    first = np.flatnonzero(np.diff(edge[order], prepend=-1))
-    count = np.diff(np.append(first, len(order)))
-    following = order[np.minimum(first + 1, len(order) - 1)]
-    plain = (count == 2) & (side[order[first]] * side[following] < 0)
-    return np.stack(np.divmod(edge[order[first]][~plain], len(vertices)), axis=1)
+    edges, turning = _edges_that_turn(vertices, faces)
+    return edges[turning]
+
+
+def _edges_that_turn(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Return all edges as `edges_of` does, (e, 2), and which of them are silhouettes, (e,)."""
+    x, y = np.ascontiguousarray(vertices[:, :2].T)
+    corners = np.ascontiguousarray(faces.T)
+    keys = []
+    for start, end, opposite in corners[_CORNERS]:
+        low, high = np.minimum(start, end), np.maximum(start, end)
+        along_x, along_y = x[high] - x[low], y[high] - y[low]
+        side = np.sign(along_x * (y[opposite] - y[low]) - along_y * (x[opposite] - x[low]))
+        # The side of the third corner, -1, 0 or 1, goes into the last two bits.
+        keys.append(4 * (low * len(vertices) + high) + side.astype(np.int64) + 1)
+    sided = np.sort(np.concatenate(keys))
+    edge, side = sided >> 2, (sided & 3) - 1
+    first = np.flatnonzero(np.diff(edge, prepend=-1))
+    count = np.diff(np.append(first, len(edge)))
+    plain = (count == 2) & (side[first] * side[np.minimum(first + 1, len(edge) - 1)] < 0)
+    return np.stack(np.divmod(edge[first], len(vertices)), axis=1), ~plain
 
 
 def silhouette_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Pairs:
@@ -81,15 +93,15 @@ def silhouette_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64]) ->
     >>> silhouette_pairs(places, np.array([[0, 1, 2], [3, 4, 5]])).gap.tolist()
     [1.0, 1.0, 1.0, 1.0]
     """
-    edges = edges_of(faces)
-    turning = np.isin(edges @ [len(vertices), 1], silhouettes(vertices, faces) @ [len(vertices), 1])
+    edges, turning = _edges_that_turn(vertices, faces)
+    plane = np.ascontiguousarray(vertices[:, :2])
     # Of edges on top of each other, one tells where all of them cross others.
     prints = footprints(vertices, faces, edges, np.flatnonzero(turning))
-    stacked = _overlapping(vertices[:, :2], edges, _in_one_cell(vertices, edges, prints.first))
-    far = prints.combined(*_meeting(vertices[:, :2], edges, *stacked)[:2])
-    near = _overlapping(vertices[:, :2], edges, _in_one_star(faces, edges, turning))
+    stacked = _overlapping(plane, edges, _in_one_cell(vertices, edges, prints.first))
+    far = prints.combined(*_meeting(plane, edges, *stacked)[:2])
+    near = _overlapping(plane, edges, _in_one_star(faces, edges, turning))
     one, other = np.concatenate([far, near], axis=1)
-    one, other, share, other_share = _meeting(vertices[:, :2], edges, one, other)
+    one, other, share, other_share = _meeting(plane, edges, one, other)
     ends, other_ends = vertices[edges[one], 2], vertices[edges[other], 2]
     height = ends[:, 0] * (1.0 - share) + ends[:, 1] * share
     other_height = other_ends[:, 0] * (1.0 - other_share) + other_ends[:, 1] * other_share
@@ -123,7 +135,7 @@ def _in_one_cell(
     keys = []
     for corner in np.array([[0, 0], [0, 1], [1, 0], [1, 1]]):
         cell = least + corner
-        inside = (cell <= most).all(axis=1)
+        inside = (cell[:, 0] <= most[:, 0]) & (cell[:, 1] <= most[:, 1])
         place = (cell[inside, 0] + 1) * (cells + 3) + cell[inside, 1] + 1
         keys.append(place * len(edges) + chosen[edge[inside]])
     return _within(np.concatenate(keys), len(edges))
@@ -132,15 +144,28 @@ def _in_one_cell(
 def _in_one_star(
     faces: NDArray[np.int64], edges: NDArray[np.int64], turning: NDArray[np.bool_]
 ) -> NDArray[np.int64]:
-    """Find edges of faces that share a vertex of a silhouette: their numbers, (2, q), some twice."""
+    """Find edges around a vertex of a silhouette that share no vertex: their numbers, (2, q), some twice."""
     n = int(faces.max(initial=0)) + 1
     at_turning = np.zeros(n, dtype=bool)
     at_turning[edges[turning]] = True
-    around = faces[at_turning[faces].any(axis=1)]
-    low, high = np.sort(around[:, [[0, 1], [1, 2], [2, 0]]], axis=2).transpose(2, 0, 1)
-    number = np.searchsorted(edges @ [n, 1], low * n + high)
-    keys = around[:, :, None] * len(edges) + number[:, None, :]
-    return _within(keys[at_turning[around]].ravel(), len(edges))
+    a, b, c = faces.T
+    around = faces[at_turning[a] | at_turning[b] | at_turning[c]]
+    start = np.ascontiguousarray(around.T)
+    end = start[[1, 2, 0]]
+    number = np.searchsorted(edges @ [n, 1], np.minimum(start, end) * n + np.maximum(start, end))
+    keys = []
+    for corner in start:
+        chosen = at_turning[corner]
+        keys.append(corner[chosen] * len(edges) + number[:, chosen])
+    both = _within(np.concatenate(keys, axis=1).ravel(), len(edges))
+    # What shares a vertex does not cross, and is half of it.
+    begin, end = np.ascontiguousarray(edges.T)
+    apart = np.zeros(both.shape[1], dtype=bool)
+    for block in range(0, both.shape[1], _BLOCK):
+        one, other = both[:, block : block + _BLOCK]
+        a, b, c, d = begin[one], end[one], begin[other], end[other]
+        apart[block : block + _BLOCK] = (a != c) & (a != d) & (b != c) & (b != d)
+    return both.compress(apart, axis=1)
 
 
 def _within(keys: NDArray[np.int64], n: int) -> NDArray[np.int64]:
@@ -159,17 +184,17 @@ def _overlapping(
     plane: NDArray[np.float64], edges: NDArray[np.int64], both: NDArray[np.int64]
 ) -> NDArray[np.int64]:
     """Choose the edges whose boxes in the picture overlap or touch: their numbers, (2, q)."""
-    begin, end = plane[edges].transpose(1, 0, 2)
+    begin, end = (plane.take(tip, axis=0) for tip in edges.T)
     box = np.concatenate([np.minimum(begin, end), -np.maximum(begin, end)], axis=1)
     turned = np.ascontiguousarray(box[:, [2, 3, 0, 1]])
     near = np.zeros(both.shape[1], dtype=bool)
     for block in range(0, both.shape[1], _BLOCK):
         one, other = both[:, block : block + _BLOCK]
-        beyond = box[one]
-        beyond += turned[other]
+        beyond = box.take(one, axis=0)
+        beyond += turned.take(other, axis=0)
         x, y, back_x, back_y = (beyond <= _CLEAR).T
         near[block : block + _BLOCK] = x & y & back_x & back_y
-    return both[:, near]
+    return both.compress(near, axis=1)
 
 
 def _meeting(

@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from o3d_relief.linalg.laplacian import cotangent_laplacian
 
-__all__ = ["Stiffness"]
+__all__ = ["REACH", "Stiffness"]
 
-_REACH = 2.0
+REACH = 2.0
 """Distance from the points at which the surface is as soft as elsewhere, in relief units: twice that within
 which nothing shall bend."""
 
@@ -24,8 +23,8 @@ class Stiffness:
     vertices : (n, 3) float64
         Original positions, in relief units.
     faces : (m, 3) int64
-    index : (q,) int64
-        The points.
+    distance : (m,) float64
+        Of the middle of each face from the points, in relief units.
 
     Attributes
     ----------
@@ -34,13 +33,10 @@ class Stiffness:
     """
 
     def __init__(
-        self, vertices: NDArray[np.float64], faces: NDArray[np.int64], index: NDArray[np.int64]
+        self, vertices: NDArray[np.float64], faces: NDArray[np.int64], distance: NDArray[np.float64]
     ) -> None:
-        distance, _ = cKDTree(vertices[index]).query(
-            vertices[faces].mean(axis=1), distance_upper_bound=_REACH
-        )
-        near = distance < _REACH
-        weights = (1.0 - (distance[near] / _REACH) ** 2) ** 2
+        near = distance < REACH
+        weights = (1.0 - (distance[near] / REACH) ** 2) ** 2
         self._form, _ = cotangent_laplacian(vertices, faces[near], weights=weights)
         self.within = np.zeros(len(vertices), dtype=bool)
         self.within[faces[near]] = True

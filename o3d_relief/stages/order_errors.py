@@ -221,9 +221,18 @@ def lifting_discs(
     for component in np.unique(label[behind]):
         own = np.flatnonzero(label == component)
         of_own = label[behind] == component
+        # What is out of the widest reach of all of them is out of every reach.
+        own = own[_within(vertices, own, behind[of_own], _LIFT * 2.0 ** int(step[of_own].max()))]
         for size in np.unique(step[of_own]):
             centres = behind[of_own & (step == size)]
             reach = _LIFT * 2.0 ** int(size)
-            distance, _ = cKDTree(vertices[centres]).query(vertices[own], distance_upper_bound=reach)
-            marked[own[np.isfinite(distance)]] = True
+            marked[own[_within(vertices, own, centres, reach)]] = True
     return marked
+
+
+def _within(
+    vertices: NDArray[np.float64], chosen: NDArray[np.int64], centres: NDArray[np.int64], reach: float
+) -> NDArray[np.bool_]:
+    """Tell which of chosen vertices lie within reach of any of the centres."""
+    distance, _ = cKDTree(vertices[centres]).query(vertices[chosen], distance_upper_bound=reach)
+    return np.asarray(np.isfinite(distance))
