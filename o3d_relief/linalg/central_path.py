@@ -6,8 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from o3d_relief.linalg.rough import RoughSolver, Solve
-from o3d_relief.progress import Tick
+from o3d_relief.linalg.newton import Everywhere, Solve, Within
 
 __all__ = ["CentralPath"]
 
@@ -39,7 +38,7 @@ class CentralPath:
 
     Parameters
     ----------
-    form, pull, origin, start, lower, upper, rows, bound, tick, positions
+    form, pull, origin, start, lower, upper, rows, bound, positions
         As for `minimise`.
 
     Attributes
@@ -50,6 +49,8 @@ class CentralPath:
     watched : (p,) bool
         Rows that take part.
     lack : (p,) float64
+    newton : Everywhere or Within
+        Where the steps are taken from; may be exchanged between two of them.
     """
 
     def __init__(
@@ -62,7 +63,6 @@ class CentralPath:
         upper: Vector,
         rows: sp.csr_array,
         bound: Vector,
-        tick: Tick,
         positions: NDArray[np.float64] | None = None,
     ) -> None:
         self.form, self.pull, self.origin = form, pull, origin
@@ -75,8 +75,9 @@ class CentralPath:
         self.barrier = _FIRST_BARRIER * self.energy(start) / self._count()
         self.force = [self.barrier / slack for slack in self.slack]
         self.rounds = 0
-        self._solver, self._known = RoughSolver(tick, positions), set[bytes]()
+        self._known = set[bytes]()
         self._active = rows[:0]
+        self.newton: Everywhere | Within = Everywhere(form, positions)
 
     def energy(self, x: Vector) -> float:
         """Return (x - o)' H (x - o) / 2."""
@@ -109,6 +110,14 @@ class CentralPath:
     def least(self) -> float:
         """Return a bound from below on the objective, as far as forces and x are in balance."""
         return self.objective(self.x) - self.gap() + float(self.lack @ self.force[2])
+
+    def imbalance(self, counted: NDArray[np.bool_]) -> Vector:
+        """Return pull - H (x - o) + forces, (n,), those of the bounds and of some rows (p,)."""
+        rest = self.pull - self.form @ (self.x - self.origin)
+        rest[self.at_lower] += self.force[0]
+        rest[self.at_upper] -= self.force[1]
+        some = np.flatnonzero(counted)
+        return np.asarray(rest + self.rows[some].T @ self.force[2][some])
 
     def add(self, rows: sp.csr_array, bound: Vector) -> None:
         """Add rows, but for those that have been added before.
@@ -219,9 +228,8 @@ class CentralPath:
         diagonal[self.at_upper] += stiffness[1]
         some = np.flatnonzero(self.watched)
         self._active = self.rows[some]
-        springs = self._active.T @ (sp.diags_array(stiffness[2][some]) @ self._active)
         self.rounds += 1
-        return self._solver.prepare((self.form + sp.diags_array(diagonal) + springs).tocsr())
+        return self.newton.prepare(diagonal, self._active, stiffness[2][some])
 
 
 def _room(values: Vector, moves: Vector) -> Vector:

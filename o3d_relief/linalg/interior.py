@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from o3d_relief.linalg.central_path import CentralPath
+from o3d_relief.linalg.refining import Refining
 from o3d_relief.progress import Tick, share_of_way, silent
 
 __all__ = ["Minimum", "minimise"]
@@ -26,6 +27,13 @@ _SOME_ROOM = 0.2
 """Room that further rows are given on the way back, as a share of what they have where all is well."""
 
 _ROUNDS = 80
+
+_LARGE = 40_000
+"""Unknowns from which on the steps are taken from a space that is coarse at first."""
+
+_CHECK_FROM = 0.08
+"""Gap, as a share of the energy, from which on rounds in such a space, which are many and cheap, are worth a
+check."""
 
 Vector = NDArray[np.float64]
 MoreRows = Callable[[Vector], tuple[sp.csr_array, Vector]]
@@ -73,7 +81,8 @@ def minimise(
     A primal-dual interior point method with Mehrotra's corrections. Each round solves one linear system, H
     plus springs on the constraints, for two right-hand sides. Of the rows only those that a step has come
     near take part in the systems; all of them limit the steps. Whether more rows are needed is asked every
-    few rounds, and the iterate may break these for a while: it goes on from where it is.
+    few rounds, and the iterate may break these for a while: it goes on from where it is. Many unknowns move
+    in patches at first, which are divided where the minimum needs it.
 
     Parameters
     ----------
@@ -93,26 +102,32 @@ def minimise(
         Given an x, returns further rows and bounds that `start` is strictly inside of, none when all is well.
         Asked now and then, and at the end: only an x with which all is well is returned, or `start`.
     positions : (n, 3) float64, optional
-        Of the vertices that the unknowns belong to: factors of large meshes are then found faster.
+        Of the vertices that the unknowns belong to: factors are then found faster, and more than 40,000
+        unknowns are gathered in patches.
     accuracy : float
         Gap between the objective and its dual, as a share of (x - o)' H (x - o) / 2, at which the iteration
         stops.
     tick : callable, optional
-        Called in every step of the linear solver, and in every round with the share of the way from the first
-        gap to `accuracy`; it may raise to end the work.
+        Called in every round with the share of the way from the first gap to `accuracy`; it may raise to end
+        the work.
 
     Returns
     -------
     Minimum
     """
     with threadpool_limits(limits=1):  # sums that do not depend on the number of threads
-        path = CentralPath(form, pull, origin, start, lower, upper, rows, bound, tick, positions)
-        accepted, least = _run(path, accuracy, more_rows, tick)
+        path = CentralPath(form, pull, origin, start, lower, upper, rows, bound, positions)
+        refining = None
+        if positions is not None and len(pull) > _LARGE:
+            refining = Refining(path, positions)
+        accepted, least = _run(path, refining, accuracy, more_rows, tick)
     share = (path.objective(accepted) - least) / max(path.energy(accepted), 1e-300)
     return Minimum(x=accepted, rounds=path.rounds, watched=int(path.watched.sum()), gap=share)
 
 
-def _run(path: CentralPath, accuracy: float, more_rows: MoreRows, tick: Tick) -> tuple[Vector, float]:
+def _run(
+    path: CentralPath, refining: Refining | None, accuracy: float, more_rows: MoreRows, tick: Tick
+) -> tuple[Vector, float]:
     """Follow the path to a place where all is well; return it, and a bound from below on the objective."""
     accepted, next_check, least = path.x, _CHECK_EVERY, -np.inf
     first_share = path.gap() / max(path.energy(path.x), 1e-300)
@@ -120,14 +135,20 @@ def _run(path: CentralPath, accuracy: float, more_rows: MoreRows, tick: Tick) ->
         path.advance(_CENTRAL * accuracy * path.energy(path.x))
         share, least = path.gap() / max(path.energy(path.x), 1e-300), path.least()
         tick(share_of_way(first_share, share, accuracy))
-        close = share <= accuracy
+        close, due = share <= accuracy, path.rounds >= next_check
+        if refining is not None:
+            least = least - refining.cost() if refining.settled(share, accuracy) else -np.inf
+            close = path.objective(path.x) - least <= accuracy * path.energy(path.x)
+            due &= share <= _CHECK_FROM
         # As long as known rows are broken, all is hardly well.
-        if path.rounds >= next_check or (close and not path.lacking.any()):
+        if due or (close and not path.lacking.any()):
             accepted = _check(path, accepted, more_rows)
             # Rows that have just come can only raise the minimum.
             if path.objective(accepted) - least <= accuracy * path.energy(accepted):
                 break
             next_check = path.rounds + _CHECK_EVERY - close
+    if refining is not None and not np.isfinite(least):
+        least = path.least() - refining.cost()
     return accepted, least
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pyamg import amg_core
 from pyamg.aggregation.aggregate import standard_aggregation
 
-__all__ = ["Multigrid", "multigrid"]
+__all__ = ["Multigrid", "aggregates", "multigrid", "smoothed", "sorted_matrix"]
 
 _STRONG = 0.05
 """Unknowns i and j may share an aggregate where |a_ij| is at least this share of sqrt(a_ii a_jj)."""
@@ -56,9 +56,9 @@ class Multigrid:
 
     def __init__(self, matrix: sp.csr_array) -> None:
         self._levels: list[_Level] = []
-        current = _sorted(matrix)
+        current = sorted_matrix(matrix)
         while current.shape[0] > _COARSEST:
-            interpolation = _interpolation(current)
+            interpolation = smoothed(current, aggregates(current))
             if interpolation.shape[1] > _LEAST_COARSENING * current.shape[0]:
                 break
             restriction = interpolation.T.tocsr()
@@ -70,7 +70,7 @@ class Multigrid:
                 restriction=restriction,
             )
             self._levels.append(level)
-            current = _sorted(restriction @ (current @ interpolation))
+            current = sorted_matrix(restriction @ (current @ interpolation))
         self._coarsest = _Coarsest(current)
 
     def __call__(self, right_hand_side: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -126,7 +126,7 @@ def multigrid(matrix: sp.csr_array) -> sla.LinearOperator:
     return sla.LinearOperator(matrix.shape, matvec=Multigrid(matrix), dtype=np.float64)
 
 
-def _sorted(matrix: sp.csr_array) -> sp.csr_matrix:
+def sorted_matrix(matrix: sp.csr_array) -> sp.csr_matrix:
     """Return a matrix with sorted 32-bit indices: pyamg goes wrong with others, in silence."""
     parts = matrix.data, matrix.indices.astype(np.int32), matrix.indptr.astype(np.int32)
     result = sp.csr_matrix(parts, shape=matrix.shape)
@@ -155,22 +155,23 @@ def _triangle(matrix: sp.csr_matrix, *, upper: bool) -> sp.csr_matrix:
     return _select(matrix, matrix.indices >= rows if upper else matrix.indices <= rows)
 
 
-def _interpolation(matrix: sp.csr_matrix) -> sp.csr_matrix:
-    """Build the interpolation from aggregates of strongly connected unknowns, smoothed once by Jacobi."""
-    n = matrix.shape[0]
+def aggregates(matrix: sp.csr_matrix) -> sp.csr_matrix:
+    """Gather strongly connected unknowns: (n, a) float64, with at most one 1 in each row."""
     root = np.sqrt(np.abs(matrix.diagonal()))
     rows = _rows(matrix)
     strong = np.abs(matrix.data) >= _STRONG * root[rows] * root[matrix.indices]
-    aggregates = standard_aggregation(_select(matrix, strong | (matrix.indices == rows)))[0]
-    constant = sp.csr_matrix(
-        (np.ones(aggregates.nnz), aggregates.indices, aggregates.indptr), shape=aggregates.shape
-    )
+    found = standard_aggregation(_select(matrix, strong | (matrix.indices == rows)))[0]
+    return sp.csr_matrix((np.ones(found.nnz), found.indices, found.indptr), shape=found.shape)
+
+
+def smoothed(matrix: sp.csr_matrix, columns: sp.csr_matrix) -> sp.csr_matrix:
+    """Smooth the columns of an interpolation, (n, a), once by Jacobi's method."""
     # The sum of a row's absolute values bounds the spectral radius row by row; an estimate from a random
     # vector would change the last digits from run to run.
-    bound = np.bincount(rows, weights=np.abs(matrix.data), minlength=n)
-    step = matrix @ constant
+    bound = np.bincount(_rows(matrix), weights=np.abs(matrix.data), minlength=matrix.shape[0])
+    step = matrix @ columns
     step.data *= np.repeat(-_SMOOTHING / np.where(bound > 0.0, bound, 1.0), np.diff(step.indptr))
-    return (constant + step).tocsr()
+    return (columns + step).tocsr()
 
 
 def _substitute(

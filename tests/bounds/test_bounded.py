@@ -6,6 +6,7 @@ from o3d_relief.bounds.crossings import crossings, edges_of
 from o3d_relief.bounds.grid import grid_pairs
 from o3d_relief.bounds.pairs import Pairs, vertex_pairs
 from o3d_relief.bounds.seen import face_weights, point_rows, seen_faces, seen_points
+from o3d_relief.linalg import interior, refining
 from o3d_relief.linalg.laplacian import cotangent_laplacian
 from o3d_relief.stages.visibility import visible_vertices
 from shapes import bust, grid, hills
@@ -111,6 +112,24 @@ def test_heavy_faces_keep_their_shape_better():
     plain, _, _, _ = closest((vertices, faces), 10.0)
     kept, _, _, _ = closest((vertices, faces), 10.0, weights=np.where(heavy, 20.0, 1.0))
     assert change(kept) < 0.5 * change(plain)
+
+
+def test_patches_come_as_close_as_single_vertices(monkeypatch):
+    shape = bust(60)
+    z = shape[0][:, 2]
+    plain, _, form, _ = closest(shape, 20.0)
+    monkeypatch.setattr(interior, "_LARGE", 1000)
+    monkeypatch.setattr(refining, "_FIRST_PATCHES", 100)
+    patched, visible, _, pairs = closest(shape, 20.0)
+
+    def energy(found):
+        return (found.z - z) @ (form @ (found.z - z))
+
+    assert energy(patched) == pytest.approx(energy(plain), rel=0.03)
+    assert patched.gap <= 0.03
+    assert not np.array_equal(patched.z, plain.z)
+    assert patched.z[visible].min() == pytest.approx(0.0, abs=1e-12)
+    assert (pairs.difference(len(z)) @ patched.z > 0.0)[pairs.gap > 1e-2].all()
 
 
 def test_lowest_seen_counts_points_of_faces():

@@ -3,7 +3,6 @@ import pytest
 import scipy.sparse as sp
 
 from o3d_relief.linalg.central_path import CentralPath
-from o3d_relief.progress import silent
 
 
 def path_in_a_box(pull=(3.0, 0.0), *, upper=2.0):
@@ -17,7 +16,6 @@ def path_in_a_box(pull=(3.0, 0.0), *, upper=2.0):
         np.full(2, upper),
         sp.csr_array((0, 2)),
         np.zeros(0),
-        silent,
     )
 
 

@@ -1,0 +1,77 @@
+"""The systems of Newton's method: a form and springs on constraints, for all unknowns or within a space."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from o3d_relief.linalg.factor import Factor
+
+__all__ = ["Everywhere", "Solve", "Within"]
+
+Solve = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+
+class Everywhere:
+    """Systems for all unknowns.
+
+    Parameters
+    ----------
+    form : (n, n) sparse float64
+    positions : (n, 3) float64 or None
+        See `Factor`.
+    """
+
+    def __init__(self, form: sp.csr_array, positions: NDArray[np.float64] | None) -> None:
+        self._form, self._positions = form, positions
+
+    def prepare(self, diagonal: NDArray[np.float64], rows: sp.csr_array, stiff: NDArray[np.float64]) -> Solve:
+        """Return what solves (H + D + R' S R) x = b for a right-hand side b.
+
+        Parameters
+        ----------
+        diagonal : (n,) float64
+            D.
+        rows : (p, n) sparse float64
+            R.
+        stiff : (p,) float64
+            S.
+
+        Returns
+        -------
+        callable
+            (n,) to (n,) float64.
+
+        Raises
+        ------
+        SolverError
+            The matrix is singular.
+        """
+        springs = rows.T @ (sp.diags_array(stiff) @ rows)
+        return Factor((self._form + sp.diags_array(diagonal) + springs).tocsr(), self._positions).solve
+
+
+class Within:
+    """Systems whose solutions are sought within a space of few dimensions.
+
+    Parameters
+    ----------
+    form : (n, n) sparse float64
+    maps : (n, q) sparse float64
+        A basis of the space.
+    """
+
+    def __init__(self, form: sp.csr_array, maps: sp.csr_array) -> None:
+        self._maps, self._back = maps, maps.T.tocsr()
+        self._form = self._back @ (form @ maps)
+
+    def prepare(self, diagonal: NDArray[np.float64], rows: sp.csr_array, stiff: NDArray[np.float64]) -> Solve:
+        """See `Everywhere`; x is in the space, and only what the space has of b counts."""
+        maps, back = self._maps, self._back
+        inside = rows @ maps
+        springs = inside.T @ (sp.diags_array(stiff) @ inside)
+        factor = Factor((self._form + back @ (sp.diags_array(diagonal) @ maps) + springs).tocsr(), None)
+        return lambda right: np.asarray(maps @ factor.solve(back @ right))

@@ -1,0 +1,77 @@
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from o3d_relief.linalg import refining
+from o3d_relief.linalg.central_path import CentralPath
+from o3d_relief.linalg.laplacian import cotangent_laplacian
+from o3d_relief.linalg.refining import Refining
+from shapes import hills
+
+
+def obstacle(side=40):
+    """A membrane that is pulled down onto bounds, and its path."""
+    vertices, faces = hills(side)
+    n = len(vertices)
+    form = (cotangent_laplacian(vertices, faces)[0] + 1e-3 * sp.eye_array(n)).tocsr()
+    bumps = -1.0 - np.cos(vertices[:, 0] / 4.0) * np.cos(vertices[:, 1] / 4.0)
+    none = sp.csr_array((0, n)), np.zeros(0)
+    bounds = bumps, np.full(n, np.inf)
+    path = CentralPath(form, np.full(n, -0.5), np.zeros(n), np.ones(n), *bounds, *none, vertices)
+    return path, vertices
+
+
+def follow(path, refined=None, *, accuracy=0.02, rounds=50):
+    """Follow a path until its gap, and what the space costs, are small; return a bound on the objective."""
+    for _ in range(rounds):
+        path.advance(0.3 * accuracy * path.energy(path.x))
+        share = path.gap() / path.energy(path.x)
+        if refined is None and share <= accuracy:
+            return path.least()
+        if refined is not None and refined.settled(share, accuracy):
+            least = path.least() - refined.cost()
+            if path.objective(path.x) - least <= accuracy * path.energy(path.x):
+                return least
+    raise AssertionError("the path has not come to its end")
+
+
+def test_the_refined_space_has_the_minimum_of_the_whole(monkeypatch):
+    monkeypatch.setattr(refining, "_FIRST_PATCHES", 20)
+    whole, _ = obstacle()
+    least = follow(whole, accuracy=1e-6)
+    path, vertices = obstacle()
+    refined = Refining(path, vertices)
+    bound = follow(path, refined)
+    assert bound <= least <= path.objective(path.x)
+    assert path.objective(path.x) - least <= 0.02 * path.energy(path.x)
+    assert (path.x > path.lower).all()
+
+
+def test_a_space_that_stays_coarse_is_found_out(monkeypatch):
+    monkeypatch.setattr(refining, "_FIRST_PATCHES", 20)
+    path, vertices = obstacle()
+    refined = Refining(path, vertices)
+    for _ in range(30):
+        path.advance(1e-3 * path.energy(path.x))
+    assert path.gap() < 2e-3 * path.energy(path.x)
+    assert refined.cost() > 0.05 * path.energy(path.x)
+    assert not refined.settled(path.gap() / path.energy(path.x), 0.02)
+
+
+def test_forces_of_a_wide_gap_are_not_looked_at():
+    path, vertices = obstacle()
+    refined = Refining(path, vertices)
+    columns = path.newton
+    assert not refined.settled(0.9, 0.02)
+    assert path.newton is columns
+
+
+@pytest.mark.parametrize("most", [20, 10**6])
+def test_cost_is_zero_for_all_unknowns_only(monkeypatch, most):
+    monkeypatch.setattr(refining, "_FIRST_PATCHES", most)
+    path, vertices = obstacle(20)
+    refined = Refining(path, vertices)
+    for _ in range(25):
+        path.advance(1e-4 * path.energy(path.x))
+    cost = refined.cost() / path.energy(path.x)
+    assert cost < 1e-6 if most > 400 else cost > 1e-3
