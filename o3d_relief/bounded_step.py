@@ -14,6 +14,7 @@ from o3d_relief.bounds.lines import Lines
 from o3d_relief.bounds.pairs import Pairs, vertex_pairs
 from o3d_relief.bounds.parts import tie_parts
 from o3d_relief.bounds.seen import face_weights, point_rows, seen_faces, seen_points
+from o3d_relief.bounds.sides import side_pull
 from o3d_relief.bounds.silhouettes import silhouette_pairs
 from o3d_relief.errors import ParameterError
 from o3d_relief.linalg.laplacian import cotangent_laplacian
@@ -47,8 +48,9 @@ def bounded_step(
     """Find the closest relief of the wanted depth."""
     z, n = vertices[:, 2], len(vertices)
     face, share = seen_points(vertices, faces)
-    weight = face_weights(vertices, faces, seen_faces(faces, visible, face))
-    weight *= _kept_shape(scene, params)[faces].mean(axis=1)
+    in_front = seen_faces(faces, visible, face)
+    kept = _kept_shape(scene, params)[faces].mean(axis=1)
+    weight = kept * face_weights(vertices, faces, in_front)
     attached = _attached(scene, params)
     # Points of faces with visible corners only are in front where the corners are.
     partly = ~visible[faces[face]].all(axis=1)
@@ -61,6 +63,8 @@ def bounded_step(
         return BoundedStage(face_weight=weight, attached=attached, z=on_plane(z - lowest), counts=shallow)
 
     form, slivers = cotangent_laplacian(vertices, faces, weights=weight)
+    middle = (float(z.max()) + lowest) / 2.0
+    pull = side_pull(vertices, faces, middle + (z - middle) * (depth / deep), in_front, kept)
     lines = Lines(vertices, faces)
     stacked = vertex_pairs(vertices, faces, lines=lines)
     ties = tie_parts(
@@ -74,7 +78,7 @@ def bounded_step(
         _stacked(vertices, faces, lines, stacked, params),
         seen,
         visible,
-        pull=np.zeros(n) if ties is None else ties.among_held_pull,
+        pull=pull if ties is None else pull + ties.among_held_pull,
         min_gap=params.min_gap / scene.unit,
         attach=attached,
         tick=tick,
