@@ -28,7 +28,7 @@ _SOME_ROOM = 0.2
 
 _ROUNDS = 80
 
-_LARGE = 40_000
+_LARGE = 60_000
 """Unknowns from which on the steps are taken from a space that is coarse at first."""
 
 _CHECK_FROM = 0.08
@@ -102,7 +102,7 @@ def minimise(
         Given an x, returns further rows and bounds that `start` is strictly inside of, none when all is well.
         Asked now and then, and at the end: only an x with which all is well is returned, or `start`.
     positions : (n, 3) float64, optional
-        Of the vertices that the unknowns belong to: factors are then found faster, and more than 40,000
+        Of the vertices that the unknowns belong to: factors are then found faster, and more than 60,000
         unknowns are gathered in patches.
     accuracy : float
         Gap between the objective and its dual, as a share of (x - o)' H (x - o) / 2, at which the iteration
