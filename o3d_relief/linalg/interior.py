@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from o3d_relief.linalg.central_path import CentralPath
+from o3d_relief.linalg.patches import Patches
 from o3d_relief.linalg.refining import Refining
 from o3d_relief.progress import Tick, share_of_way, silent
 
@@ -30,6 +31,9 @@ _ROUNDS = 80
 
 _LARGE = 60_000
 """Unknowns from which on the steps are taken from a space that is coarse at first."""
+
+_FIRST_PATCHES = 5000
+"""Patches that span this space, at most."""
 
 _CHECK_FROM = 0.08
 """Gap, as a share of the energy, from which on rounds in such a space, which are many and cheap, are worth a
@@ -73,6 +77,7 @@ def minimise(
     bound: Vector,
     more_rows: MoreRows,
     positions: NDArray[np.float64] | None = None,
+    in_patches: bool = True,
     accuracy: float = 0.03,
     tick: Tick = silent,
 ) -> Minimum:
@@ -102,8 +107,9 @@ def minimise(
         Given an x, returns further rows and bounds that `start` is strictly inside of, none when all is well.
         Asked now and then, and at the end: only an x with which all is well is returned, or `start`.
     positions : (n, 3) float64, optional
-        Of the vertices that the unknowns belong to: factors are then found faster, and more than 60,000
-        unknowns are gathered in patches.
+        Of the vertices that the unknowns belong to: factors are then found faster.
+    in_patches : bool
+        Gather more than 60,000 unknowns that have positions in patches.
     accuracy : float
         Gap between the objective and its dual, as a share of (x - o)' H (x - o) / 2, at which the iteration
         stops.
@@ -118,8 +124,8 @@ def minimise(
     with threadpool_limits(limits=1):  # sums that do not depend on the number of threads
         path = CentralPath(form, pull, origin, start, lower, upper, rows, bound, positions)
         refining = None
-        if positions is not None and len(pull) > _LARGE:
-            refining = Refining(path, positions)
+        if in_patches and positions is not None and len(pull) > _LARGE:
+            refining = Refining(path, Patches(form, positions, _FIRST_PATCHES))
         accepted, least = _run(path, refining, accuracy, more_rows, tick)
     share = (path.objective(accepted) - least) / max(path.energy(accepted), 1e-300)
     return Minimum(x=accepted, rounds=path.rounds, watched=int(path.watched.sum()), gap=share)

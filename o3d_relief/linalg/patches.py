@@ -25,7 +25,7 @@ class Patches:
         Tells what is strongly coupled.
     positions : (n, 3) float64
     most : int
-        Number of patches to begin with, at most, as far as there are no more parts.
+        Number of patches to begin with, at most, where couplings are strong enough for so few.
     """
 
     def __init__(self, form: sp.csr_array, positions: NDArray[np.float64], most: int) -> None:

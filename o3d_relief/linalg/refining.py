@@ -14,14 +14,11 @@ from o3d_relief.linalg.patches import Patches
 
 __all__ = ["Refining"]
 
-_FIRST_PATCHES = 5000
-"""Patches at the beginning, at most."""
-
 _LOOK_FROM = 0.2
 """Gap, as a share of the energy, from which on the forces tell where the space is too coarse."""
 
-_MISSING = 0.4
-"""Share of the accuracy that the space may cost in the end."""
+_MISSING = 0.35
+"""Share of the accuracy that the space may cost in the end; the path itself comes down to 0.6."""
 
 _MISSING_BEFORE = 0.1
 """Share of the gap that it may cost before."""
@@ -46,15 +43,15 @@ class Refining:
     Parameters
     ----------
     path : CentralPath
-    positions : (n, 3) float64
-        Of the vertices that the unknowns belong to.
+    patches : Patches
+        Span the space.
     """
 
-    def __init__(self, path: CentralPath, positions: NDArray[np.float64]) -> None:
-        self._path = path
-        self._patches = Patches(path.form, positions, _FIRST_PATCHES)
+    def __init__(self, path: CentralPath, patches: Patches) -> None:
+        self._path, self._patches = path, patches
         self._form = (path.form + sp.diags_array(_RIDGE * path.form.diagonal())).tocsr()
         self._cycle = multigrid(self._form)
+        self._more = 1.0  # what the space costs, as a multiple of what single vertices tell
         self._enter()
 
     def settled(self, share: float, accuracy: float) -> bool:
@@ -77,9 +74,7 @@ class Refining:
         path = self._path
         # Rows that have just come are held by forces that are none of the minimum's.
         rest, energy = path.imbalance(path.watched & ~path.lacking), path.energy(path.x)
-        # What lies in the space comes into balance by itself, with the steps.
-        outside = rest - self._maps @ (self._maps.T @ rest)
-        local = 0.5 * outside**2 / self._form.diagonal()
+        local = self._more * self._local(rest)
         missing = float(local.sum()) / energy
         allowed = max(_MISSING * accuracy, _MISSING_BEFORE * share)
         if missing > allowed:
@@ -91,7 +86,16 @@ class Refining:
         """Return by how much the space lowers the dual bound on the objective."""
         rest = self._path.imbalance(self._path.watched)
         moved, _ = sla.cg(self._form, rest, rtol=_ROUGH, atol=0.0, maxiter=_MOST_STEPS, M=self._cycle)
-        return 0.5 * float(rest @ moved)
+        cost, local = 0.5 * float(rest @ moved), float(self._local(rest).sum())
+        if local > 0.0 and not self._path.lacking.any():
+            self._more = max(self._more, cost / local)
+        return cost
+
+    def _local(self, rest: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what each vertex alone could gain outside of the space, (n,)."""
+        # What lies in the space comes into balance by itself, with the steps.
+        outside = rest - self._maps @ (self._maps.T @ rest)
+        return np.asarray(0.5 * outside**2 / self._form.diagonal())
 
     def _enter(self) -> None:
         self._maps = self._patches.maps()

@@ -6,10 +6,10 @@ from o3d_relief.bounds.crossings import crossings, edges_of
 from o3d_relief.bounds.grid import grid_pairs
 from o3d_relief.bounds.pairs import Pairs, vertex_pairs
 from o3d_relief.bounds.seen import face_weights, point_rows, seen_faces, seen_points
-from o3d_relief.linalg import interior, refining
+from o3d_relief.linalg import interior
 from o3d_relief.linalg.laplacian import cotangent_laplacian
 from o3d_relief.stages.visibility import visible_vertices
-from shapes import bust, grid, hills
+from shapes import bust, grid, hills, joined, moved
 
 
 def no_rows(n):
@@ -119,7 +119,7 @@ def test_patches_come_as_close_as_single_vertices(monkeypatch):
     z = shape[0][:, 2]
     plain, _, form, _ = closest(shape, 20.0)
     monkeypatch.setattr(interior, "_LARGE", 1000)
-    monkeypatch.setattr(refining, "_FIRST_PATCHES", 100)
+    monkeypatch.setattr(interior, "_FIRST_PATCHES", 100)
     patched, visible, _, pairs = closest(shape, 20.0)
 
     def energy(found):
@@ -130,6 +130,16 @@ def test_patches_come_as_close_as_single_vertices(monkeypatch):
     assert not np.array_equal(patched.z, plain.z)
     assert patched.z[visible].min() == pytest.approx(0.0, abs=1e-12)
     assert (pairs.difference(len(z)) @ patched.z > 0.0)[pairs.gap > 1e-2].all()
+
+
+def test_many_parts_are_not_solved_in_patches(monkeypatch):
+    plates = joined(
+        grid(21), *[moved(grid(4, size=5), (x, y, 20)) for x in range(-40, 41, 16) for y in (-30, 0, 30, 40)]
+    )
+    monkeypatch.setattr(interior, "_LARGE", 10**6)
+    plain, _, _, _ = closest(plates, 10.0)
+    monkeypatch.setattr(interior, "_LARGE", 100)
+    assert np.array_equal(closest(plates, 10.0)[0].z, plain.z)
 
 
 def test_lowest_seen_counts_points_of_faces():

@@ -1,9 +1,10 @@
 import numpy as np
 
 from o3d_relief import cotangent_laplacian
+from o3d_relief.bounds.gaps import out_of_order
 from o3d_relief.bounds.grid import grid_pairs
 from o3d_relief.bounds.hinges import hinged_pairs
-from o3d_relief.bounds.order import keep_order, out_of_order
+from o3d_relief.bounds.order import keep_order
 from o3d_relief.bounds.silhouettes import silhouette_pairs
 from o3d_relief.linalg.laplacian import vertex_areas
 

@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 
 from o3d_relief import cotangent_laplacian
+from o3d_relief.bounds.gaps import out_of_order
 from o3d_relief.bounds.grid import grid_pairs
-from o3d_relief.bounds.order import keep_order, out_of_order
+from o3d_relief.bounds.order import keep_order
 from o3d_relief.bounds.pairs import Pairs, vertex_pairs
 from o3d_relief.linalg.laplacian import vertex_areas
 from shapes import grid, joined, moved
@@ -56,12 +57,6 @@ def test_correction_is_local():
     assert found.left == 0
     far = vertices[:, 0] > 10
     assert np.array_equal(found.z[far], z[far])
-
-
-def test_what_lies_behind_the_plane_does_not_count():
-    vertices, _, _, _, pairs = _setup(_comb())
-    assert not out_of_order(pairs, -vertices[:, 2] - 1.0).any()
-    assert out_of_order(pairs, -vertices[:, 2] + 50.0).all()
 
 
 def test_visible_vertices_come_in_front():

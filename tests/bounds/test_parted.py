@@ -1,8 +1,9 @@
 import numpy as np
 
 from o3d_relief import cotangent_laplacian
+from o3d_relief.bounds.gaps import out_of_order
 from o3d_relief.bounds.grid import grid_pairs
-from o3d_relief.bounds.order import keep_order, out_of_order
+from o3d_relief.bounds.order import keep_order
 from o3d_relief.bounds.pairs import Pairs, close_pairs, vertex_pairs
 from o3d_relief.bounds.parted import Parted
 from o3d_relief.bounds.raster import Raster

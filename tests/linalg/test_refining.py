@@ -5,6 +5,7 @@ import scipy.sparse as sp
 from o3d_relief.linalg import refining
 from o3d_relief.linalg.central_path import CentralPath
 from o3d_relief.linalg.laplacian import cotangent_laplacian
+from o3d_relief.linalg.patches import Patches
 from o3d_relief.linalg.refining import Refining
 from shapes import hills
 
@@ -35,22 +36,20 @@ def follow(path, refined=None, *, accuracy=0.02, rounds=50):
     raise AssertionError("the path has not come to its end")
 
 
-def test_the_refined_space_has_the_minimum_of_the_whole(monkeypatch):
-    monkeypatch.setattr(refining, "_FIRST_PATCHES", 20)
+def test_the_refined_space_has_the_minimum_of_the_whole():
     whole, _ = obstacle()
     least = follow(whole, accuracy=1e-6)
     path, vertices = obstacle()
-    refined = Refining(path, vertices)
+    refined = Refining(path, Patches(path.form, vertices, 20))
     bound = follow(path, refined)
     assert bound <= least <= path.objective(path.x)
     assert path.objective(path.x) - least <= 0.02 * path.energy(path.x)
     assert (path.x > path.lower).all()
 
 
-def test_a_space_that_stays_coarse_is_found_out(monkeypatch):
-    monkeypatch.setattr(refining, "_FIRST_PATCHES", 20)
+def test_a_space_that_stays_coarse_is_found_out():
     path, vertices = obstacle()
-    refined = Refining(path, vertices)
+    refined = Refining(path, Patches(path.form, vertices, 20))
     for _ in range(30):
         path.advance(1e-3 * path.energy(path.x))
     assert path.gap() < 2e-3 * path.energy(path.x)
@@ -60,18 +59,34 @@ def test_a_space_that_stays_coarse_is_found_out(monkeypatch):
 
 def test_forces_of_a_wide_gap_are_not_looked_at():
     path, vertices = obstacle()
-    refined = Refining(path, vertices)
+    refined = Refining(path, Patches(path.form, vertices, 20))
     columns = path.newton
     assert not refined.settled(0.9, 0.02)
     assert path.newton is columns
 
 
 @pytest.mark.parametrize("most", [20, 10**6])
-def test_cost_is_zero_for_all_unknowns_only(monkeypatch, most):
-    monkeypatch.setattr(refining, "_FIRST_PATCHES", most)
+def test_cost_is_zero_for_all_unknowns_only(most):
     path, vertices = obstacle(20)
-    refined = Refining(path, vertices)
+    refined = Refining(path, Patches(path.form, vertices, most))
     for _ in range(25):
         path.advance(1e-4 * path.energy(path.x))
     cost = refined.cost() / path.energy(path.x)
     assert cost < 1e-6 if most > 400 else cost > 1e-3
+
+
+def test_what_single_vertices_do_not_tell_is_made_up_for():
+    path, vertices = obstacle()
+    patches = Patches(path.form, vertices, 20)
+    refined = Refining(path, patches)
+    for _ in range(30):
+        path.advance(1e-3 * path.energy(path.x))
+    share, cost = path.gap() / path.energy(path.x), refined.cost() / path.energy(path.x)
+    accuracy = 0.9 * cost / refining._MISSING
+    refined = Refining(path, patches)
+    space = path.newton
+    assert refined.settled(share, accuracy)  # as far as they tell, this space will do
+    assert path.newton is space
+    refined.cost()
+    assert not refined.settled(share, accuracy)
+    assert path.newton is not space
