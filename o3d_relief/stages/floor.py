@@ -13,6 +13,10 @@ _REACH = 2
 """Cells to each side over which the lowest visible height is sought; those around a place, whose mean is
 taken, are within one less."""
 
+_HIGHEST = 2.0
+"""Relief units above what is lowest around, one unit to each side, from which on a surface is no longer steep
+but stands before another one: what is kept must not grow with the distance to that, at the outline alone."""
+
 
 def lowest_heights(
     vertices: NDArray[np.float64], visible: NDArray[np.bool_], *, share: float
@@ -20,7 +24,7 @@ def lowest_heights(
     """Return how low each visible vertex may come to lie.
 
     A surface pressed flat onto S looks cut off: where it has to stay in front of S, it keeps a share of its
-    height above the lowest visible point around it.
+    height above the lowest visible point around it, as far as that is local: at most of two relief units.
 
     Parameters
     ----------
@@ -50,5 +54,5 @@ def lowest_heights(
         for grid in (np.where(known, around, 0.0), known.astype(np.float64))
     )
     floor = np.full(len(vertices), -np.inf)
-    floor[visible] = share * np.maximum(seen[:, 2] - total / share_known, 0.0)
+    floor[visible] = share * np.clip(seen[:, 2] - total / share_known, 0.0, _HIGHEST)
     return floor

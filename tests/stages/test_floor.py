@@ -41,3 +41,15 @@ def test_hidden_vertices_have_no_floor():
     visible = vertices[:, 0] > 0
     floor = lowest_heights(vertices, visible, share=0.5)
     assert np.array_equal(floor == -np.inf, ~visible)
+
+
+def test_outlines_do_not_count_what_lies_far_behind_as_their_surroundings():
+    wall, bar = grid(201)[0], moved((grid(41, size=20)[0], None), (0, 0, 60.0))[0]
+    vertices = np.concatenate([wall, bar])
+    visible = np.abs(vertices[:, :2]).max(axis=1) > 10.0
+    visible[len(wall) :] = True
+    floor = lowest_heights(vertices, visible, share=0.2)
+    on_bar = floor[len(wall) :]
+    inside = np.abs(bar[:, :2]).max(axis=1) < 8.0
+    assert on_bar[inside] == pytest.approx(0.0, abs=1e-12)
+    assert 0.0 < on_bar.max() <= 0.2 * 2.0
