@@ -66,7 +66,7 @@ def bounded_step(
     middle = (float(z.max()) + lowest) / 2.0
     pull = side_pull(vertices, faces, middle + (z - middle) * (depth / deep), in_front, kept)
     lines = Lines(vertices, faces)
-    stacked = vertex_pairs(vertices, faces, lines=lines)
+    stacked = vertex_pairs(lines)
     ties = tie_parts(
         vertices, faces, form, np.arange(n), stacked, stacked.gap * (depth / deep), across_gaps=_EMPTY
     )
@@ -107,7 +107,7 @@ def _stacked(
     params: ReliefParams,
 ) -> Pairs:
     """Add to the pairs of vertices those where silhouettes cross, and on a grid what these do not imply."""
-    grid = grid_pairs(vertices, faces, lines=lines)
+    grid = grid_pairs(lines)
     grid = grid.select(grid.gap > _CONTACT)
     if params.min_gap == 0.0:  # what is asked of the others is not linear between two triangles
         grid = extreme_pairs(grid, vertices[:, :2])

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from o3d_relief.attenuation_step import beta_of_clusters, chosen_points, edited_points, settled_points
+from o3d_relief.bounds.lines import Lines
 from o3d_relief.bounds.pairs import vertex_pairs
 from o3d_relief.bounds.parts import PartSprings, find_springs
 from o3d_relief.linalg.laplacian import cotangent_laplacian
@@ -77,7 +78,7 @@ class LiveScene:
         if self.parts == 1:
             return None
         faces = self.scene.faces
-        return find_springs(self.vertices, faces, self.laplacian, vertex_pairs(self.vertices, faces))
+        return find_springs(self.vertices, faces, self.laplacian, vertex_pairs(Lines(self.vertices, faces)))
 
     def scaled(self, params: ReliefParams) -> NDArray[np.float64]:
         """Scale the scene linearly to the depth of the bounded mode, what is visible in front of S.

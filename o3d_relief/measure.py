@@ -224,11 +224,8 @@ class Yardstick:
             )
         z = z[self._used] / self._unit
         if self._pairs is None:
-            vertices, faces = self._scene.vertices, self._scene.faces
-            lines = Lines(vertices, faces)
-            self._pairs = Pairs.join(
-                [vertex_pairs(vertices, faces, lines=lines), grid_pairs(vertices, faces, lines=lines)]
-            )
+            lines = Lines(self._scene.vertices, self._scene.faces)
+            self._pairs = Pairs.join([vertex_pairs(lines), grid_pairs(lines)])
         upper, lower = self._pairs.heights(z)
         # What ends behind S is cut off: it is in nobody's way.
         inverted = (upper < lower - _SAME) & (np.maximum(upper, lower) > 0.0)

@@ -79,6 +79,5 @@ def _further_pairs(
 
     For a smallest gap, which need not be least at vertices and silhouettes, the grid is a fine one.
     """
-    grid = grid_pairs(vertices, faces, side=_LINES if min_gap == 0.0 else 4 * _LINES, lines=lines)
-    close = close_pairs(vertices, faces, lines=lines)
-    return Pairs.join([silhouette_pairs(vertices, faces), close, grid])
+    grid = grid_pairs(lines, side=_LINES if min_gap == 0.0 else 4 * _LINES)
+    return Pairs.join([silhouette_pairs(vertices, faces), close_pairs(lines), grid])

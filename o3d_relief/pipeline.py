@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from types import MappingProxyType
 
+import numpy as np
 import open3d as o3d
+import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from o3d_relief.attenuation_step import attenuation_step
 from o3d_relief.bounded_step import bounded_step
@@ -17,7 +20,7 @@ from o3d_relief.order_step import order_step
 from o3d_relief.output import trimmed_mesh
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.progress import OnProgress
-from o3d_relief.records import TrimStage
+from o3d_relief.records import SceneStage, TrimStage
 from o3d_relief.relief import Relief
 from o3d_relief.restoration_step import restoration_step
 from o3d_relief.scan_params import ScanParams
@@ -122,41 +125,7 @@ def make_relief(
     if params.bounded:
         z = journal.keep(bounded_step(vertices, faces, visible, scene, params, tick=journal.tick)).z
     else:
-        clusters = journal.keep(clusters_step(vertices, params))
-        journal.begin("attenuation")
-        points = journal.keep(attenuation_step(vertices, visible, scene, clusters, params))
-        journal.begin("construction")
-        lines = Lines(vertices, faces)
-        pairs = stacked_pairs(lines, params)
-        z = journal.keep(
-            construction_step(
-                vertices, faces, visible, laplacian, slivers, clusters, points, pairs, tick=journal.tick
-            )
-        ).z
-        journal.begin("restoration")
-        around = NearPoints(vertices, faces, visible, points.kept_index)
-        restored = journal.keep(
-            restoration_step(
-                vertices, visible, laplacian, z, clusters, points, around, params, tick=journal.tick
-            )
-        )
-        journal.begin("order")
-        ordered = order_step(
-            vertices,
-            faces,
-            visible,
-            laplacian,
-            restored,
-            around,
-            lines,
-            pairs,
-            params,
-            scene.unit,
-            tick=journal.tick,
-        )
-        z = journal.keep(ordered).z
-        journal.begin("compression")
-        z = journal.keep(compression_step(z, params, scene.unit)).z
+        z = _attenuated(vertices, visible, laplacian, slivers, scene, params, journal)
 
     journal.begin("trim")
     out_faces, turned = turned_to_viewer(in_faces, scene, vertices, visible, laplacian)
@@ -187,3 +156,49 @@ def make_relief(
         trimmed=trimmed,
         scan=None if scanned is None else scanned.params,
     )
+
+
+def _attenuated(
+    vertices: NDArray[np.float64],
+    visible: NDArray[np.bool_],
+    laplacian: sp.csr_array,
+    slivers: int,
+    scene: SceneStage,
+    params: ReliefParams,
+    journal: Journal,
+) -> NDArray[np.float64]:
+    """Go through the stages of the mode "attenuation", from the clusters to the compression."""
+    faces = scene.faces
+    clusters = journal.keep(clusters_step(vertices, params))
+    journal.begin("attenuation")
+    points = journal.keep(attenuation_step(vertices, visible, scene, clusters, params))
+    journal.begin("construction")
+    lines = Lines(vertices, faces)
+    pairs = stacked_pairs(lines, params)
+    z = journal.keep(
+        construction_step(
+            vertices, faces, visible, laplacian, slivers, clusters, points, pairs, tick=journal.tick
+        )
+    ).z
+    journal.begin("restoration")
+    around = NearPoints(vertices, faces, visible, points.kept_index)
+    restored = journal.keep(
+        restoration_step(vertices, visible, laplacian, z, clusters, points, around, params, tick=journal.tick)
+    )
+    journal.begin("order")
+    ordered = order_step(
+        vertices,
+        faces,
+        visible,
+        laplacian,
+        restored,
+        around,
+        lines,
+        pairs,
+        params,
+        scene.unit,
+        tick=journal.tick,
+    )
+    z = journal.keep(ordered).z
+    journal.begin("compression")
+    return journal.keep(compression_step(z, params, scene.unit)).z

@@ -130,7 +130,7 @@ def _behind(z: NDArray[np.float64], visible: NDArray[np.bool_]) -> int:
 
 def stacked_pairs(lines: Lines, params: ReliefParams) -> Pairs | None:
     """Find what must keep its order at the vertices; None where the order is not kept."""
-    return vertex_pairs(lines.vertices, lines.faces, lines=lines) if params.in_order else None
+    return vertex_pairs(lines) if params.in_order else None
 
 
 def construction_step(

@@ -3,6 +3,7 @@ import pytest
 from scipy.sparse.csgraph import connected_components
 
 from o3d_relief import cotangent_laplacian
+from o3d_relief.bounds.lines import Lines
 from o3d_relief.bounds.pairs import vertex_pairs
 from o3d_relief.bounds.parts import find_springs
 from o3d_relief.live_construction import LiveConstruction
@@ -45,7 +46,7 @@ def _labels(laplacian):
 def test_equal_to_the_construction_of_the_pipeline(shape, tied):
     vertices, faces = shape
     laplacian, _ = cotangent_laplacian(vertices, faces)
-    springs = find_springs(vertices, faces, laplacian, vertex_pairs(vertices, faces)) if tied else None
+    springs = find_springs(vertices, faces, laplacian, vertex_pairs(Lines(vertices, faces))) if tied else None
     rng = np.random.default_rng(0)
     label = _labels(laplacian)
     # Six points on the large part, one on each of the small ones but two.

@@ -150,8 +150,8 @@ def certify(
     lying = relief_faces[~upright(before, relief_faces)]
     low, high, lines = scene.min(axis=0), scene.max(axis=0), Lines(relief, lying)
     stacked = (
-        vertex_pairs(relief, lying, lines=lines),
-        grid_pairs(relief, lying, low=low, high=high, lines=lines),
+        vertex_pairs(lines),
+        grid_pairs(lines, low=low, high=high),
     )
     both = [inversions(relief, pairs, relief_before, origin, min_gap=min_gap) for pairs in stacked]
     edges = edges_of(relief_faces)

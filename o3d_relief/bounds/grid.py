@@ -15,27 +15,22 @@ _NARROW = 0.01
 
 
 def grid_pairs(
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.int64],
+    lines: Lines,
     *,
     side: int = 1024,
     low: NDArray[np.float64] | None = None,
     high: NDArray[np.float64] | None = None,
-    lines: Lines | None = None,
 ) -> Pairs:
     """Pair the points that follow each other on the lines of a regular grid.
 
     Parameters
     ----------
-    vertices : (n, 3) float64
-        In the relief frame, in relief units.
-    faces : (m, 3) int64
+    lines : Lines
+        Of a mesh.
     side : int
         Number of lines along x and along y.
     low, high : (3,) float64, optional
         Corners of the box that the grid covers, that of the vertices where omitted.
-    lines : Lines, optional
-        Those of this mesh, where others cast them, too.
 
     Returns
     -------
@@ -43,10 +38,9 @@ def grid_pairs(
         Neighbours on the surface, which meet where the line passes, are left out. The gap of surfaces that
         touch is known to a rounding error only, and may be a little less than 0.
     """
-    lines = Lines(vertices, faces) if lines is None else lines
     if len(lines.faces) == 0:
         return Pairs.join([])
-    box, faces = lines.box, lines.faces
+    box, vertices, faces = lines.box, lines.vertices, lines.faces
     low = vertices.min(axis=0) if low is None else low
     high = vertices.max(axis=0) if high is None else high
     steps = (np.arange(side) + 0.5) / side

@@ -74,7 +74,7 @@ class BetweenLines:
         crossing = met.select(new).pairs(before, z)
         if len(crossing) > _MANY:
             return crossing
-        turned = _turned(vertex_pairs(relief, self._faces), before)
+        turned = _turned(vertex_pairs(Lines(relief, self._faces)), before)
         found = Pairs.join([turned, foot_pairs(self._vertices, self._faces, self._edges, z)])
         return Pairs.join([crossing, found.select(np.maximum(*found.heights(z)) > 0.0)])
 
@@ -102,8 +102,8 @@ class BetweenLines:
         lying = cut.faces[~upright(np.column_stack([cut.vertices[:, :2], before]), cut.faces)]
         low, high = self._vertices.min(axis=0), self._vertices.max(axis=0)
         lines = Lines(cut.vertices, lying)
-        at_vertices = vertex_pairs(cut.vertices, lying, lines=lines)
-        on_grid = grid_pairs(cut.vertices, lying, low=low, high=high, lines=lines)
+        at_vertices = vertex_pairs(lines)
+        on_grid = grid_pairs(lines, low=low, high=high)
         turned = _turned(Pairs.join([at_vertices, on_grid]), before)
         turned = turned.select(~origin.crossed(turned.upper, turned.lower))
         found = Pairs.join([met.select(~known).pairs(before, after), turned])

@@ -96,56 +96,44 @@ class Pairs:
         )
 
 
-def vertex_pairs(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], *, lines: Lines | None = None
-) -> Pairs:
+def vertex_pairs(lines: Lines) -> Pairs:
     """Pair each vertex with the next surface above and below it.
 
     Parameters
     ----------
-    vertices : (n, 3) float64
-        In the relief frame, in relief units.
-    faces : (m, 3) int64
-    lines : Lines, optional
-        Those of this mesh, where others cast them, too.
+    lines : Lines
+        Of a mesh.
 
     Returns
     -------
     Pairs
         At most 2 n; those closer than 1e-3 relief units are left out.
     """
-    lines = Lines(vertices, faces) if lines is None else lines
     if len(lines.faces) == 0:
         return Pairs.join([])
-    everything = np.arange(len(vertices))
+    everything = np.arange(len(lines.vertices))
     return Pairs.join([_next_pairs(lines, everything, 2 * SAME_PLACE * direction) for direction in (UP, -UP)])
 
 
-def close_pairs(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], *, lines: Lines | None = None
-) -> Pairs:
+def close_pairs(lines: Lines) -> Pairs:
     """Pair each vertex with the surfaces that are too close to it for `vertex_pairs`, but do not touch it.
 
     Parameters
     ----------
-    vertices : (n, 3) float64
-        In the relief frame, in relief units.
-    faces : (m, 3) int64
-    lines : Lines, optional
-        Those of this mesh, where others cast them, too.
+    lines : Lines
+        Of a mesh.
 
     Returns
     -------
     Pairs
         With gaps between 5e-4 and about 1e-3 relief units.
     """
-    lines = Lines(vertices, faces) if lines is None else lines
     if len(lines.faces) == 0:
         return Pairs.join([])
     box, found = lines.box, []
     for direction in (UP, -UP):
         step = 0.1 * SAME_PLACE * direction
-        rays = box.rays(vertices + step, direction)
+        rays = box.rays(lines.vertices + step, direction)
         reach = 2.2 * SAME_PLACE / box.size
         candidates = np.flatnonzero(box.scene.test_occlusions(rays, tfar=reach).numpy())
         if len(candidates):

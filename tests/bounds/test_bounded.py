@@ -4,6 +4,7 @@ import pytest
 from o3d_relief.bounds.bounded import closest_relief, lowest_seen
 from o3d_relief.bounds.crossings import crossings, edges_of
 from o3d_relief.bounds.grid import grid_pairs
+from o3d_relief.bounds.lines import Lines
 from o3d_relief.bounds.pairs import Pairs, vertex_pairs
 from o3d_relief.bounds.seen import face_weights, point_rows, seen_faces, seen_points
 from o3d_relief.linalg import interior
@@ -24,7 +25,7 @@ def closest(shape, depth, *, attach=(), weights=None, min_gap=0.0):
     weight = face_weights(vertices, faces, seen_faces(faces, visible, face))
     form, _ = cotangent_laplacian(vertices, faces, weights=weight if weights is None else weight * weights)
     partly = ~visible[faces[face]].all(axis=1)
-    pairs = Pairs.join([vertex_pairs(vertices, faces), grid_pairs(vertices, faces, side=256)])
+    pairs = Pairs.join([vertex_pairs(Lines(vertices, faces)), grid_pairs(Lines(vertices, faces), side=256)])
     seen = point_rows(faces, face[partly], share[partly], n)
     found = closest_relief(
         vertices,
@@ -69,7 +70,7 @@ def test_order_is_kept_on_and_between_the_lines(depth):
     vertices, faces = bust()
     found, visible, _, _ = closest((vertices, faces), depth)
     relief = np.column_stack([vertices[:, :2], found.z])
-    for pairs in (vertex_pairs(relief, faces), grid_pairs(relief, faces)):
+    for pairs in (vertex_pairs(Lines(relief, faces)), grid_pairs(Lines(relief, faces))):
         upper, lower = pairs.heights(vertices[:, 2])
         assert (upper - lower > -1e-3).all()
         assert len(pairs) > 100

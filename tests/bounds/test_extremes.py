@@ -4,6 +4,7 @@ from scipy.spatial import ConvexHull
 
 from o3d_relief.bounds.extremes import extreme_pairs
 from o3d_relief.bounds.grid import grid_pairs
+from o3d_relief.bounds.lines import Lines
 from o3d_relief.bounds.pairs import Pairs
 from shapes import bust, grid, joined, moved
 
@@ -14,7 +15,7 @@ def places(pairs, vertices):
 
 def test_two_large_triangles_keep_what_spans_the_others():
     vertices, faces = joined(grid(2, size=10.0), moved(grid(2, size=10.0), (0.0, 0.0, 5.0)))
-    pairs = grid_pairs(vertices, faces, side=64)
+    pairs = grid_pairs(Lines(vertices, faces), side=64)
     kept = extreme_pairs(pairs, vertices[:, :2], side=64)
     assert 0 < len(kept) < 0.1 * len(pairs)
     area = ConvexHull(places(pairs, vertices)).volume
@@ -23,7 +24,7 @@ def test_two_large_triangles_keep_what_spans_the_others():
 
 def test_a_bound_on_what_is_kept_holds_on_all():
     vertices, faces = bust(8)
-    pairs = grid_pairs(vertices, faces, side=128)
+    pairs = grid_pairs(Lines(vertices, faces), side=128)
     kept = extreme_pairs(pairs, vertices[:, :2], side=128)
     assert len(kept) < 0.5 * len(pairs)
     rng = np.random.default_rng(3)

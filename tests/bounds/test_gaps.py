@@ -2,13 +2,14 @@ import numpy as np
 
 from o3d_relief.bounds.gaps import out_of_order, required_gaps, spare, wanted_gaps, worst_of_stacks
 from o3d_relief.bounds.grid import grid_pairs
+from o3d_relief.bounds.lines import Lines
 from shapes import grid, joined, moved
 
 
 def _layers():
     """Three plates above each other, 10 apart, and what is stacked on a grid of lines."""
     plates = joined(grid(5), *[moved(grid(5), (0, 0, z)) for z in (10, 20)])
-    return plates[0], grid_pairs(*plates, side=16)
+    return plates[0], grid_pairs(Lines(*plates), side=16)
 
 
 def test_what_lies_behind_the_plane_does_not_count():

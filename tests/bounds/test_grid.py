@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from o3d_relief.bounds.grid import grid_pairs
+from o3d_relief.bounds.lines import Lines
 from shapes import grid, joined, moved
 
 
@@ -11,7 +12,7 @@ def _two_plates(gap=10.0):
 
 def test_grid_pairs_join_neighbours_on_a_line_only():
     vertices, faces = joined(grid(5), moved(grid(5), (0, 0, 4)), moved(grid(5), (0, 0, 20)))
-    pairs = grid_pairs(vertices, faces, side=32)
+    pairs = grid_pairs(Lines(vertices, faces), side=32)
     assert len(pairs) == 2 * 32 * 32
     assert sorted(set(np.round(pairs.gap).astype(int))) == [4, 16]
 
@@ -22,6 +23,6 @@ def test_lines_of_the_grid_meet_steep_triangles_exactly():
     steep = np.column_stack([vertices[:, :2] + 1e3 / 7, 50.0 * vertices[:, 0]])
     others, other_faces = grid(8)
     above = np.column_stack([others[:, :2] + 1e3 / 7, 50.0 * others[:, 0] + 3.0])
-    pairs = grid_pairs(*joined((steep, faces), (above, other_faces)), side=37)
+    pairs = grid_pairs(Lines(*joined((steep, faces), (above, other_faces))), side=37)
     assert len(pairs) == 37 * 37
     assert pairs.gap == pytest.approx(3.0, abs=1e-9)

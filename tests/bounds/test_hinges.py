@@ -4,6 +4,7 @@ from o3d_relief import cotangent_laplacian
 from o3d_relief.bounds.gaps import out_of_order
 from o3d_relief.bounds.grid import grid_pairs
 from o3d_relief.bounds.hinges import hinged_pairs
+from o3d_relief.bounds.lines import Lines
 from o3d_relief.bounds.order import keep_order
 from o3d_relief.bounds.silhouettes import silhouette_pairs
 from o3d_relief.linalg.laplacian import vertex_areas
@@ -20,7 +21,7 @@ def test_a_fold_that_turned_inside_out_at_the_plane_is_put_right_in_front_of_it(
     vertices, faces = _fold()
     # Only the corner is in front: where the edges cross, both triangles are behind S already.
     z = np.array([1.4, -7.8, -1.6, -0.6, -5.4])
-    known, lines = silhouette_pairs(vertices, faces), grid_pairs(vertices, faces, side=400)
+    known, lines = silhouette_pairs(vertices, faces), grid_pairs(Lines(vertices, faces), side=400)
     assert not out_of_order(known, z).any()
     assert out_of_order(lines, z).any()
     laplacian, _ = cotangent_laplacian(vertices, faces)

@@ -2,6 +2,7 @@ import pytest
 
 from o3d_relief.bounds.grid import grid_pairs
 from o3d_relief.bounds.inversions import inversions
+from o3d_relief.bounds.lines import Lines
 from o3d_relief.bounds.origin import Origin
 from o3d_relief.bounds.pairs import vertex_pairs
 from shapes import grid, joined, moved
@@ -16,7 +17,7 @@ def test_swapped_plates_are_inverted_and_others_are_not():
     scene, faces, origin = _plates()
     relief = scene.copy()
     relief[121:, 2] = -3.0
-    for pairs in (vertex_pairs(relief, faces), grid_pairs(relief, faces, side=64)):
+    for pairs in (vertex_pairs(Lines(relief, faces)), grid_pairs(Lines(relief, faces), side=64)):
         found = inversions(relief, pairs, scene[:, 2], origin)
         assert found.inverted == found.tested > 0
         assert found.crossed == 0
@@ -32,7 +33,7 @@ def test_what_crossed_in_the_scene_does_not_count():
     tilted = tilted[0] + [[0, 0, x] for x, _, _ in tilted[0]], tilted[1]  # half of it behind the wall
     scene, faces = joined(wall, tilted)
     relief = scene * [1, 1, -1]
-    pairs = grid_pairs(relief, faces, side=64)
+    pairs = grid_pairs(Lines(relief, faces), side=64)
     found = inversions(relief, pairs, scene[:, 2], Origin(faces, faces, scene))
     assert found.inverted == 0
     assert found.crossed == len(pairs) > 100
@@ -42,7 +43,7 @@ def test_what_crossed_in_the_scene_does_not_count():
 def test_gaps_that_became_too_small_are_counted():
     scene, faces, origin = _plates()
     relief = scene * [1, 1, 0.1]
-    pairs = grid_pairs(relief, faces, side=64)
+    pairs = grid_pairs(Lines(relief, faces), side=64)
     assert inversions(relief, pairs, scene[:, 2], origin, min_gap=2.0).gaps_missed == len(pairs)
     assert inversions(relief, pairs, scene[:, 2], origin, min_gap=0.5).gaps_missed == 0
     assert inversions(relief, pairs, relief[:, 2], origin, min_gap=2.0).gaps_tested == 0

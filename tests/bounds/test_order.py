@@ -4,6 +4,7 @@ import pytest
 from o3d_relief import cotangent_laplacian
 from o3d_relief.bounds.gaps import out_of_order
 from o3d_relief.bounds.grid import grid_pairs
+from o3d_relief.bounds.lines import Lines
 from o3d_relief.bounds.order import keep_order
 from o3d_relief.bounds.pairs import Pairs, vertex_pairs
 from o3d_relief.linalg.laplacian import vertex_areas
@@ -13,7 +14,7 @@ from shapes import grid, joined, moved
 def _setup(shape, side=64):
     vertices, faces = shape
     laplacian, _ = cotangent_laplacian(vertices, faces)
-    pairs = Pairs.join([vertex_pairs(vertices, faces), grid_pairs(vertices, faces, side=side)])
+    pairs = Pairs.join([vertex_pairs(Lines(vertices, faces)), grid_pairs(Lines(vertices, faces), side=side)])
     return vertices, faces, laplacian, vertex_areas(vertices, faces), pairs
 
 

@@ -3,6 +3,7 @@ import numpy as np
 from o3d_relief import cotangent_laplacian
 from o3d_relief.bounds.gaps import out_of_order
 from o3d_relief.bounds.grid import grid_pairs
+from o3d_relief.bounds.lines import Lines
 from o3d_relief.bounds.order import keep_order
 from o3d_relief.bounds.pairs import Pairs, close_pairs, vertex_pairs
 from o3d_relief.bounds.parted import Parted
@@ -23,14 +24,15 @@ def _roof_through_plate():
 
 
 def _known(vertices, faces):
-    return Pairs.join([make(vertices, faces) for make in (vertex_pairs, close_pairs, silhouette_pairs)])
+    lines = Lines(vertices, faces)
+    return Pairs.join([vertex_pairs(lines), close_pairs(lines), silhouette_pairs(vertices, faces)])
 
 
 def test_a_top_that_sank_through_a_plate_comes_back_though_nothing_crosses_any_more():
     vertices, faces = _roof_through_plate()
     z = vertices[:, 2].copy()
     z[121:] -= 0.5
-    known, lines = _known(vertices, faces), grid_pairs(vertices, faces, side=997)
+    known, lines = _known(vertices, faces), grid_pairs(Lines(vertices, faces), side=997)
     flat = (lines.upper >= 121).all(axis=1) & (np.ptp(vertices[:, 2][lines.upper], axis=1) == 0.0)
     top = lines.select(flat & (lines.lower < 121).all(axis=1))
     assert len(top) > 100

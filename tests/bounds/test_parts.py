@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from o3d_relief import ReliefParams, cotangent_laplacian, make_relief
+from o3d_relief.bounds.lines import Lines
 from o3d_relief.bounds.pairs import vertex_pairs
 from o3d_relief.bounds.parts import tie_parts
 from o3d_relief.stages.construction import construct
@@ -11,7 +12,7 @@ from shapes import bust, grid, joined, moved, sphere, to_mesh
 def _tie(shape, index, shrink=0.3):
     vertices, faces = shape
     laplacian, _ = cotangent_laplacian(vertices, faces)
-    pairs = vertex_pairs(vertices, faces)
+    pairs = vertex_pairs(Lines(vertices, faces))
     return laplacian, tie_parts(vertices, faces, laplacian, index, pairs, shrink * pairs.gap)
 
 

@@ -5,6 +5,7 @@ import pytest
 
 from o3d_relief.bounds.crossings import crossings, edges_of
 from o3d_relief.bounds.grid import grid_pairs
+from o3d_relief.bounds.lines import Lines
 from o3d_relief.bounds.origin import Origin
 from o3d_relief.bounds.pairs import vertex_pairs
 from o3d_relief.bounds.places import Place, crossing_places, few, gap_places, pair_places, told
@@ -18,7 +19,7 @@ def _place(x, reason="", kind="inversion"):
 
 
 def _gaps(scene, faces, relief, min_gap, make=_GRID):
-    pairs = make(relief, faces)
+    pairs = make(Lines(relief, faces))
     origin = Origin(faces, faces, scene)
     some = pairs.select(few(np.flatnonzero(pairs.gap < min_gap)))
     return gap_places(relief, scene[:, 2], some, pairs, origin, min_gap=min_gap)
@@ -72,7 +73,7 @@ def test_reasons_for_gaps_in_a_deep_relief():
 def test_inverted_plates_have_no_reason_and_both_heights():
     scene, faces = joined(grid(11), moved(grid(5, size=40), (0, 0, 10)))
     relief = np.where(scene[:, 2:] > 5, scene - [0, 0, 13], scene)
-    pairs = _GRID(relief, faces)
+    pairs = _GRID(Lines(relief, faces))
     places = pair_places(
         "inversion", relief, pairs.select(few(np.arange(len(pairs)))), Origin(faces, faces, scene)
     )

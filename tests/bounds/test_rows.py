@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from o3d_relief.bounds.lines import Lines
 from o3d_relief.bounds.pairs import Pairs, vertex_pairs
 from o3d_relief.bounds.rows import gap_rows
 from shapes import bust
@@ -8,7 +9,7 @@ from shapes import bust
 
 def test_gap_rows_are_those_of_the_pairs():
     vertices, faces = bust(16)
-    pairs = vertex_pairs(vertices, faces)
+    pairs = vertex_pairs(Lines(vertices, faces))
     z = np.random.default_rng(0).normal(size=len(vertices))
     assert gap_rows(pairs, len(z)) @ z == pytest.approx(pairs.difference(len(z)) @ z)
 

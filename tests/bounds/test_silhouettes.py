@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from o3d_relief.bounds.lines import Lines
 from o3d_relief.bounds.pairs import vertex_pairs
 from o3d_relief.bounds.silhouettes import silhouette_pairs, silhouettes
 from shapes import bust, grid, joined, moved, sphere
@@ -34,7 +35,9 @@ def test_a_ball_turns_back_at_its_equator():
 def test_crossed_bars_have_a_pair_at_each_corner(angle):
     vertices, faces = joined(_bar(0.0, 0.0), _bar(angle, 3.0))
     pairs = silhouette_pairs(vertices, faces)
-    assert len(vertex_pairs(vertices, faces)) == 0  # no vertex above the other bar: nothing else would tell
+    assert (
+        len(vertex_pairs(Lines(vertices, faces))) == 0
+    )  # no vertex above the other bar: nothing else would tell
     assert pairs.gap == pytest.approx([3.0] * 4)
     upper, lower = pairs.heights(vertices[:, 2])
     assert upper - lower == pytest.approx(pairs.gap)
