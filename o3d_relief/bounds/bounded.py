@@ -176,9 +176,8 @@ def closest_relief(
 def _parts(faces: NDArray[np.int64], n: int) -> int:
     """Count the parts that no triangle connects."""
     edges = faces[:, :2].ravel(), faces[:, 1:].ravel()
-    return int(
-        connected_components(sp.coo_array((np.ones(2 * len(faces)), edges), (n, n)), directed=False)[0]
-    )
+    graph = sp.coo_array((np.ones(2 * len(faces)), edges), (n, n))
+    return int(connected_components(graph, directed=False, return_labels=False))
 
 
 class _Place:

@@ -22,6 +22,10 @@ _SAME = 1e-3
 _SHALLOW = 1e-4
 """Depth in relief units from which crossings of surfaces that were apart count."""
 
+_ASIDE = ((0.0, 0.0), (1e-5, 0.0), (-1e-5, 0.0), (0.0, 1e-5), (0.0, -1e-5))
+"""How far beside vertices is looked, too, in relief units: of a vertex on the outline of a surface it is
+chance in float32 on which side it comes to lie, and for the certificate that may be another one."""
+
 _MANY = 200
 """Where so many pairs cross, nothing else is looked for: most of it goes away with them."""
 
@@ -102,9 +106,9 @@ class BetweenLines:
         lying = cut.faces[~upright(np.column_stack([cut.vertices[:, :2], before]), cut.faces)]
         low, high = self._vertices.min(axis=0), self._vertices.max(axis=0)
         lines = Lines(cut.vertices, lying)
-        at_vertices = vertex_pairs(lines)
+        at_vertices = [vertex_pairs(lines, aside=aside) for aside in _ASIDE]
         on_grid = grid_pairs(lines, low=low, high=high)
-        turned = _turned(Pairs.join([at_vertices, on_grid]), before)
+        turned = _turned(Pairs.join([*at_vertices, on_grid]), before)
         turned = turned.select(~origin.crossed(turned.upper, turned.lower))
         found = Pairs.join([met.select(~known).pairs(before, after), turned])
         return (gap_rows(found, len(first)) @ carry).tocsr(), found.gap

@@ -96,13 +96,15 @@ class Pairs:
         )
 
 
-def vertex_pairs(lines: Lines) -> Pairs:
+def vertex_pairs(lines: Lines, *, aside: tuple[float, float] = (0.0, 0.0)) -> Pairs:
     """Pair each vertex with the next surface above and below it.
 
     Parameters
     ----------
     lines : Lines
         Of a mesh.
+    aside : two float
+        How far beside the vertices, in relief units, the lines pass.
 
     Returns
     -------
@@ -112,7 +114,8 @@ def vertex_pairs(lines: Lines) -> Pairs:
     if len(lines.faces) == 0:
         return Pairs.join([])
     everything = np.arange(len(lines.vertices))
-    return Pairs.join([_next_pairs(lines, everything, 2 * SAME_PLACE * direction) for direction in (UP, -UP)])
+    steps = [np.array([*aside, 2 * SAME_PLACE * up]) for up in (1.0, -1.0)]
+    return Pairs.join([_next_pairs(lines, everything, step) for step in steps])
 
 
 def close_pairs(lines: Lines) -> Pairs:
@@ -143,9 +146,9 @@ def close_pairs(lines: Lines) -> Pairs:
 
 
 def _next_pairs(lines: Lines, chosen: NDArray[np.int64], step: NDArray[np.float64]) -> Pairs:
-    """Pair chosen vertices with the next surface in the direction of a step, from there on."""
+    """Pair chosen vertices with the next surface above or below a step aside, from there on."""
     vertices, faces = lines.vertices, lines.faces
-    direction = np.sign(step)
+    direction = np.array([0.0, 0.0, np.sign(step[2])])
     hits = lines.box.scene.cast_rays(lines.box.rays(vertices[chosen] + step, direction))
     met = np.flatnonzero(hits["primitive_ids"].numpy() != MISS)
     triangle = hits["primitive_ids"].numpy()[met].astype(np.int64)

@@ -32,10 +32,6 @@ _ROUNDS = 80
 _LARGE = 60_000
 """Unknowns from which on the steps are taken from a space that is coarse at first."""
 
-_LARGEST = 300_000
-"""Unknowns up to which they are. Beyond, at a twentieth of the depth, a scan came out with two pairs of
-250,000 out of order."""
-
 _FIRST_PATCHES = 5000
 """Patches that span this space, at most."""
 
@@ -113,7 +109,7 @@ def minimise(
     positions : (n, 3) float64, optional
         Of the vertices that the unknowns belong to: factors are then found faster.
     in_patches : bool
-        Gather 60,000 to 300,000 unknowns that have positions in patches.
+        Gather more than 60,000 unknowns that have positions in patches.
     accuracy : float
         Gap between the objective and its dual, as a share of (x - o)' H (x - o) / 2, at which the iteration
         stops.
@@ -128,7 +124,7 @@ def minimise(
     with threadpool_limits(limits=1):  # sums that do not depend on the number of threads
         path = CentralPath(form, pull, origin, start, lower, upper, rows, bound, positions)
         refining = None
-        if in_patches and positions is not None and _LARGE < len(pull) <= _LARGEST:
+        if in_patches and positions is not None and len(pull) > _LARGE:
             refining = Refining(path, Patches(form, positions, _FIRST_PATCHES))
         accepted, least = _run(path, refining, accuracy, more_rows, tick)
     share = (path.objective(accepted) - least) / max(path.energy(accepted), 1e-300)

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from o3d_relief.bounds import missed
 from o3d_relief.bounds.missed import BetweenLines
 from shapes import bust, grid, joined, moved
 
@@ -64,3 +65,21 @@ def test_a_wall_that_rises_through_what_it_touched_is_found_after_the_cut():
     assert (rows @ z < 0.0).any()
     z[5] = 2.0
     assert len(BetweenLines(vertices, faces).missed(z)[1]) == 0
+
+
+def test_vertices_just_beside_an_outline_are_looked_at(monkeypatch):
+    # A sheet that turns back at x = 0, and above it a plate whose corner stands just beside that outline.
+    sheet = np.array(
+        [[0, -10, 20], [0, 10, 20], [-20, -10, 24], [-20, 10, 24], [-20, -10, 10], [-20, 10, 10.0]]
+    )
+    plate = np.array([[5e-3, 0, 30], [20, -5, 30], [20, 5, 30.0]])
+    vertices = np.concatenate([sheet, plate])
+    faces = np.array([[0, 1, 2], [1, 3, 2], [0, 4, 1], [1, 4, 5], [6, 7, 8]])
+    z = np.where(np.arange(9) > 5, 5.0, vertices[:, 2])
+    between = BetweenLines(vertices, faces)
+    assert len(between.missed(z)[1]) == 0
+    # What rounding errors do in a millionth of a unit, in a hundredth.
+    monkeypatch.setattr(missed, "_ASIDE", tuple((1e3 * x, 1e3 * y) for x, y in missed._ASIDE))
+    rows, gap = between.missed(z)
+    assert gap == pytest.approx(10.0, abs=0.01)
+    assert rows @ z == pytest.approx(-15.0, abs=0.01)
