@@ -47,6 +47,18 @@ def start(scene, output, *words, before=""):
     return subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
 
 
+CRAWL = """
+import pathlib, sys, time
+
+def crawl(self, data):
+    print('writing', file=sys.stderr, flush=True)
+    time.sleep(30)
+
+pathlib.Path.write_bytes = crawl
+"""
+"""Code after which no file is written for half a minute: long enough for a signal on any machine."""
+
+
 def limit_files(size):
     """Code after which no file may grow beyond size: what a full disk does, from one byte on."""
     return f"import resource; resource.setrlimit(resource.RLIMIT_FSIZE, ({size}, {size}))"
@@ -124,7 +136,7 @@ class TestSignals:
     def test_at_a_stage(self, scene, tmp_path, number, stage):
         out = tmp_path / "r.obj"
         out.write_text("the last one")
-        with start(scene, out) as process:
+        with start(scene, out, before=CRAWL) as process:
             told = ""
             for line in process.stderr:
                 told += line
@@ -139,10 +151,7 @@ class TestSignals:
         assert out.read_text() == "the last one"
 
     def test_while_it_writes(self, scene, tmp_path):
-        slow = "import time, pathlib; write = pathlib.Path.write_bytes\n"
-        slow += "def crawl(self, data): print('writing', file=sys.stderr, flush=True); time.sleep(30)\n"
-        before = f"import sys; {slow}pathlib.Path.write_bytes = crawl"
-        with start(scene, tmp_path / "r.ply", before=before) as process:
+        with start(scene, tmp_path / "r.ply", before=CRAWL) as process:
             for line in process.stderr:
                 if line == "writing\n":
                     assert any(name.startswith(".o3d-relief-") for name in names(tmp_path))
