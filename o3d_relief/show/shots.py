@@ -32,11 +32,14 @@ class Shot:
         Towards the camera, from the point that it looks at; NaN where nothing is hit.
     normal : (size, size, 3) float32
         Of the triangle that is hit, turned to the camera, in the frame of the surface.
+    face : (size, size) int64
+        The triangle that is hit; -1 where there is none.
     """
 
     hit: NDArray[np.bool_]
     height: NDArray[np.float64]
     normal: NDArray[np.float32]
+    face: NDArray[np.int64]
 
 
 class Body:
@@ -75,11 +78,12 @@ class Body:
         camera = self.camera(view, reach, size)
         steps = np.arange(size) + 0.5
         x, y = np.meshgrid(steps, steps)
-        height, normal = self.look(camera, np.column_stack([x.ravel(), y.ravel()]))
+        height, normal, face = self.look(camera, np.column_stack([x.ravel(), y.ravel()]))
         return Shot(
             hit=np.isfinite(height).reshape(size, size),
             height=height.reshape(size, size),
             normal=normal.reshape(size, size, 3),
+            face=face.reshape(size, size),
         )
 
     def picture(self, view: tuple[float, float], reach: NDArray[np.float64], size: int) -> Picture:
@@ -95,8 +99,8 @@ class Body:
 
     def look(
         self, camera: Camera, places: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
-        """Return the heights (p,) and normals (p, 3) at places (p, 2) of a picture, in pixels."""
+    ) -> tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.int64]]:
+        """Return the heights (p,), normals (p, 3) and faces (p,) at places (p, 2) of a picture, in pixels."""
         right, upward, back = camera.axes
         across = (places[:, 0] - camera.middle[0]) / camera.scale
         above = (camera.middle[1] - places[:, 1]) / camera.scale
@@ -110,7 +114,8 @@ class Body:
         normal = hits["primitive_normals"].numpy()
         normal = normal * np.where(normal @ back.astype(np.float32) < 0.0, -1.0, 1.0)[:, None]
         height = np.where(np.isfinite(distance), start - distance * self._box_size, np.nan)
-        return height, normal.astype(np.float32)
+        face = np.where(np.isfinite(distance), hits["primitive_ids"].numpy().astype(np.int64), -1)
+        return height, normal.astype(np.float32), face
 
 
 def normal_angle(one: Shot, other: Shot) -> float:
@@ -169,7 +174,7 @@ def discontinuities(
     bottom, bottom_place = height[low], np.column_stack([low % width, low // width]) + 0.5
     for _ in range(_HALVINGS):
         place = (top_place + bottom_place) / 2
-        between, _ = body.look(camera, place)
+        between, _, _ = body.look(camera, place)
         up = top - between < between - bottom  # the jump is below: the upper end moves
         top, top_place = np.where(up, between, top), np.where(up[:, None], place, top_place)
         bottom, bottom_place = np.where(up, bottom, between), np.where(up[:, None], bottom_place, place)
