@@ -1,4 +1,4 @@
-"""How fast is it: python benchmarks/speed.py MESH... [--sizes N...] [--repeat N] [-k N] [--literal-up-to N].
+"""How fast is it: python benchmarks/speed.py MESH... [--sizes N...] [--repeat N] [-k N] [--profile].
 
 Runs in one process, in turn: (a) the package, with the paper's parameters, with its defaults, and in bounded
 mode to a quarter of the scene's visible depth; (b) a straightforward transcription of the paper,
@@ -6,22 +6,25 @@ mode to a quarter of the scene's visible depth; (b) a straightforward transcript
 matrix with the fastest direct solver at hand (pypardiso or cholespy, in the extra "bench"). Ratios are taken
 within each round, medians over the rounds. Processor time counts all threads; it tells more than the clock
 where others share the machine. Memory is the peak above what the process has with its libraries loaded, the
-mesh included.
+mesh included. --profile tells which functions of the package the time goes into.
 """
 
 from __future__ import annotations
 
 import argparse
+import cProfile
 import ctypes
 import gc
 import os
 import platform
+import pstats
 import statistics
 import sys
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from importlib import import_module, metadata
 from pathlib import Path
 from typing import Any
@@ -38,6 +41,9 @@ from refined import refined
 
 WATCH_EVERY = 0.01
 """Seconds between two looks at the memory."""
+
+PROFILE_FROM = 0.02
+"""Share of the time from which on a function is listed in a profile."""
 
 
 @dataclass
@@ -149,6 +155,11 @@ class Case:
 
         return timed(work, self._base)
 
+    def runs(self, k: int, *, full: bool) -> dict[str, rel.ReliefParams]:
+        """Return what of the package is measured."""
+        runs = {"package": rel.ReliefParams.paper(k=k)}
+        return runs | {"defaults": rel.ReliefParams(k=k), "bounded": self.quarter} if full else runs
+
     def literal(self) -> Cost:
         """Run the transcription, on the scene that the package has welded and scaled."""
         return timed(lambda: literal_relief(self._vertices, self._faces, self._k)[2], self._base)
@@ -172,6 +183,25 @@ class Case:
         return timed(work, self._base)
 
 
+def profile(work: Callable[[], object]) -> list[str]:
+    """Return a table of the package's functions that take the most time, by the processor's clock."""
+    profiler = cProfile.Profile(time.process_time)
+    profiler.runcall(work)
+    stats: Any = pstats.Stats(profiler)
+    package = Path(rel.__file__).parent
+    found = [
+        (whole, own, calls, f"{Path(file).relative_to(package).with_suffix('').as_posix()}.{name}")
+        for (file, _, name), (_, calls, own, whole, _) in stats.stats.items()
+        if package in Path(file).parents and whole >= PROFILE_FROM * stats.total_tt
+    ]
+    lines = ["| function | calls | CPU s | without what it calls |", "|---|---|---|---|"]
+    lines += [
+        f"| {name} | {calls} | {whole:.2f} | {own:.2f} |"
+        for whole, own, calls, name in sorted(found, reverse=True)
+    ]
+    return lines
+
+
 def measure(
     case: Case,
     solve: Callable[[sp.csr_array, np.ndarray], np.ndarray] | None,
@@ -184,12 +214,10 @@ def measure(
     """Run everything in turn, `repeat` times."""
     costs: dict[str, list[Cost]] = {}
     for _ in range(repeat):
-        costs.setdefault("package", []).append(case.package(rel.ReliefParams.paper(k=k)))
-        if solve is not None:
-            costs.setdefault("floor", []).append(case.floor(solve))
-        if full:
-            costs.setdefault("defaults", []).append(case.package(rel.ReliefParams(k=k)))
-            costs.setdefault("bounded", []).append(case.package(case.quarter))
+        for number, (what, params) in enumerate(case.runs(k, full=full).items()):
+            costs.setdefault(what, []).append(case.package(params))
+            if number == 0 and solve is not None:
+                costs.setdefault("floor", []).append(case.floor(solve))
         if literal:
             costs.setdefault("literal", []).append(case.literal())
     return costs
@@ -271,6 +299,7 @@ def main() -> None:
     parser.add_argument("-k", type=int, default=128)
     parser.add_argument("--literal-up-to", type=float, default=3e5, help="vertices up to which (b) is run")
     parser.add_argument("--floor-up-to", type=float, default=2e6, help="vertices up to which (c) is run")
+    parser.add_argument("--profile", action="store_true", help="run once more, and list the functions")
     parser.add_argument("--no-defaults", action="store_true", help="leave out defaults and bounded mode")
     options = parser.parse_args()
     solver, solve = direct_solver()
@@ -296,6 +325,10 @@ def main() -> None:
             print(f"\n{name}, {case.vertices:,} vertices, seconds of each stage\n")
             print("\n".join(stage_table(costs)), flush=True)
             table += rows_of(name, case.vertices, costs)
+            runs = case.runs(options.k, full=not options.no_defaults) if options.profile else {}
+            for what, params in runs.items():
+                print(f"\n{name}, {case.vertices:,} vertices, {what}\n")
+                print("\n".join(profile(partial(case.package, params))), flush=True)
     print("\n" + "\n".join(table))
 
 

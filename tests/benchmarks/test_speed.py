@@ -39,6 +39,17 @@ def test_table_has_a_row_for_everything_that_is_run(tmp_path, monkeypatch, capsy
     assert abs(int(rows[5][1].replace(",", "")) - 1500) < 300
 
 
+def test_profile_names_the_functions_that_take_the_time():
+    mesh = to_mesh(bust(40))
+    told = speed.profile(lambda: rel.make_relief(mesh, rel.ReliefParams(k=8)))
+    cells = [[cell.strip() for cell in row.split("|")[1:-1]] for row in told[2:]]
+    assert cells[0][0] == "pipeline.make_relief"
+    assert any(name.startswith("bounds/") for name, *_ in cells)
+    whole = [float(seconds) for _, _, seconds, _ in cells]
+    assert whole == sorted(whole, reverse=True)
+    assert whole[-1] >= 0.0199 * whole[0] - 0.005
+
+
 def test_ratios_are_taken_round_by_round():
     slow = [speed.Cost(wall, 1.0, 0.0) for wall in (2.0, 30.0, 8.0)]
     fast = [speed.Cost(wall, 1.0, 0.0) for wall in (1.0, 10.0, 2.0)]
