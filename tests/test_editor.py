@@ -14,6 +14,7 @@ from o3d_relief import (
     make_relief,
     read_mesh,
 )
+from o3d_relief.linalg.cholesky import Cholesky
 from o3d_relief.stages.compression import compress
 from shapes import bust, exploded, hills, joined, moved, sphere, to_mesh
 
@@ -300,7 +301,13 @@ def test_no_factorisation_where_the_points_stay(editor, monkeypatch):
         sizes.append(matrix.shape[0])
         return factorise(matrix, **options)
 
+    class Told(Cholesky):
+        def __init__(self, matrix, dissection):
+            sizes.append(matrix.shape[0])
+            super().__init__(matrix, dissection)
+
     monkeypatch.setattr(sla, "splu", told)
+    monkeypatch.setattr("o3d_relief.linalg.factor.Cholesky", Told)
     monkeypatch.setattr(sla, "cg", None)
     editor.change(beta=0.05, alpha=0.9, discard_above=0.5)
     editor.edit([1, 2], action="discard")

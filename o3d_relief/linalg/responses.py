@@ -31,7 +31,7 @@ class Responses:
 
     G is held in float32: 4 n p bytes, 128 MB for 250,000 vertices and 128 points. Its rounding errors of
     6e-8 are averaged by the weights: heights are exact to about 1e-7 of the largest displacement. The
-    factor that it is made with takes 1.8 kB for each vertex and is let go unless it is kept.
+    factor that it is made with takes 1 kB for each vertex and is let go unless it is kept.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class Responses:
         # All that is dense keeps the order of the factor: sorting it would take as long as solving for it.
         self._free = free_vertices[factor.order]
         self._factor = factor if keep_factor else None
-        self._weights = np.zeros((len(self._free), len(index)), dtype=np.float32, order="F")
+        self._weights = np.zeros((len(self._free), len(index)), dtype=np.float32)
         self._schur = self._point_rows[:, index].toarray()
         pulls = -rows[factor.order][:, index].tocsc()
         near = np.unique(pulls.indices)
@@ -80,7 +80,7 @@ class Responses:
         for start in range(0, len(index), _BLOCK):
             tick(start / len(index))
             block = slice(start, start + _BLOCK)
-            solved = factor.solve_ordered(pulls[:, block].toarray(order="F"))
+            solved = factor.solve_ordered(pulls[:, block].toarray(), overwrite=True)
             self._weights[:, block] = solved
             self._schur[:, block] += coupling @ solved[near]
 
