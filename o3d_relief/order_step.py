@@ -11,7 +11,7 @@ from o3d_relief.bounds.lines import Lines
 from o3d_relief.bounds.near_points import NearPoints
 from o3d_relief.bounds.order import Ordered, keep_order
 from o3d_relief.bounds.pairs import Pairs, close_pairs
-from o3d_relief.bounds.silhouettes import silhouette_pairs
+from o3d_relief.bounds.silhouettes import edges_that_turn, silhouette_pairs
 from o3d_relief.linalg.laplacian import vertex_areas
 from o3d_relief.params import ReliefParams
 from o3d_relief.progress import Tick, silent
@@ -48,12 +48,26 @@ def order_step(
     # The compression comes later and shrinks gaps, at most by its smallest ratio.
     ratio, lowest = ratios(z, params, unit)
     min_gap = params.min_gap / unit / (0.95 * lowest if ratio < 1.0 else 1.0)
-    pairs = Pairs.join([pairs, _further_pairs(vertices, faces, lines, min_gap)])
+    turns = edges_that_turn(vertices, faces)
+    # For a smallest gap, which need not be least at vertices and silhouettes, the grid is a fine one.
+    grid = grid_pairs(lines, side=_LINES if min_gap == 0.0 else 4 * _LINES)
+    pairs = Pairs.join([pairs, silhouette_pairs(vertices, faces, turns), close_pairs(lines), grid])
     areas = vertex_areas(vertices, faces)
     front = visible if params.in_front else None
 
     def ordered_with(form: sp.csr_array) -> Ordered:
-        return keep_order(vertices, faces, form, areas, z, pairs, in_front=front, min_gap=min_gap, tick=tick)
+        return keep_order(
+            vertices,
+            faces,
+            form,
+            areas,
+            z,
+            pairs,
+            edges=turns[0],
+            in_front=front,
+            min_gap=min_gap,
+            tick=tick,
+        )
 
     if restored.stiffness == 0.0:
         ordered = ordered_with(laplacian)
@@ -70,14 +84,3 @@ def order_step(
         "visible_behind": int((ordered.z[visible] < 0.0).sum()),
     }
     return OrderStage(z=on_plane(ordered.z), counts=counts)
-
-
-def _further_pairs(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], lines: Lines, min_gap: float
-) -> Pairs:
-    """Pair what is stacked elsewhere than at vertices, and what is very close to them.
-
-    For a smallest gap, which need not be least at vertices and silhouettes, the grid is a fine one.
-    """
-    grid = grid_pairs(lines, side=_LINES if min_gap == 0.0 else 4 * _LINES)
-    return Pairs.join([silhouette_pairs(vertices, faces), close_pairs(lines), grid])

@@ -20,6 +20,7 @@ from o3d_relief.order_step import order_step
 from o3d_relief.output import trimmed_mesh
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.progress import OnProgress
+from o3d_relief.rays import UnitBox
 from o3d_relief.records import SceneStage, TrimStage
 from o3d_relief.relief import Relief
 from o3d_relief.restoration_step import restoration_step
@@ -119,13 +120,17 @@ def make_relief(
     journal.begin("perspective")
     vertices = journal.keep(perspective_step(scene.vertices, view)).vertices
     journal.begin("visibility")
-    visible = journal.keep(visibility_step(vertices, faces, view)).visible
+    # Who keeps the order casts more rays through the scene.
+    box = UnitBox(vertices, faces) if params.in_order and not params.bounded else None
+    visible = journal.keep(visibility_step(vertices, faces, view, box)).visible
     journal.begin("bounded" if params.bounded else "clusters")
     laplacian, slivers = cotangent_laplacian(vertices, faces)
     if params.bounded:
         z = journal.keep(bounded_step(vertices, faces, visible, scene, params, tick=journal.tick)).z
     else:
-        z = _attenuated(vertices, visible, laplacian, slivers, scene, params, journal)
+        z = _attenuated(
+            vertices, visible, laplacian, slivers, scene, Lines(vertices, faces, box), params, journal
+        )
 
     journal.begin("trim")
     out_faces, turned = turned_to_viewer(in_faces, scene, vertices, visible, laplacian)
@@ -164,6 +169,7 @@ def _attenuated(
     laplacian: sp.csr_array,
     slivers: int,
     scene: SceneStage,
+    lines: Lines,
     params: ReliefParams,
     journal: Journal,
 ) -> NDArray[np.float64]:
@@ -173,7 +179,6 @@ def _attenuated(
     journal.begin("attenuation")
     points = journal.keep(attenuation_step(vertices, visible, scene, clusters, params))
     journal.begin("construction")
-    lines = Lines(vertices, faces)
     pairs = stacked_pairs(lines, params)
     z = journal.keep(
         construction_step(

@@ -6,7 +6,7 @@ import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
-__all__ = ["unit_box"]
+__all__ = ["UnitBox", "unit_box"]
 
 
 def unit_box(
@@ -35,3 +35,28 @@ def unit_box(
         o3d.core.Tensor(faces.astype(np.uint32)),
     )
     return scene, middle, size
+
+
+class UnitBox:
+    """A mesh in the unit box, and rays of one direction through it.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+    faces : (m, 3) int64
+
+    Attributes
+    ----------
+    scene, middle, size
+        See `unit_box`.
+    """
+
+    def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
+        self.scene, self.middle, self.size = unit_box(vertices, faces)
+
+    def rays(self, origins: NDArray[np.float64], direction: NDArray[np.float64]) -> o3d.core.Tensor:
+        """Return rays from origins (q, 3), of the mesh's frame, in one direction (3,)."""
+        rays = np.zeros((len(origins), 6), dtype=np.float32)
+        rays[:, :3] = (origins - self.middle) / self.size
+        rays[:, 3:] = direction
+        return o3d.core.Tensor(rays)

@@ -16,6 +16,7 @@ from o3d_relief.bounds.parts import tie_parts
 from o3d_relief.errors import MeshError, ParameterError
 from o3d_relief.params import ReliefParams, Triple, View
 from o3d_relief.progress import Tick, silent
+from o3d_relief.rays import UnitBox
 from o3d_relief.records import (
     AttenuationStage,
     ClustersStage,
@@ -106,9 +107,11 @@ def perspective_step(vertices: NDArray[np.float64], view: View) -> PerspectiveSt
     return PerspectiveStage(vertices=drawn)
 
 
-def visibility_step(vertices: NDArray[np.float64], faces: NDArray[np.int64], view: View) -> VisibilityStage:
+def visibility_step(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], view: View, box: UnitBox | None = None
+) -> VisibilityStage:
     """Find what the viewpoint sees."""
-    visible = visible_vertices(vertices, faces, viewpoint=view.viewpoint)
+    visible = visible_vertices(vertices, faces, viewpoint=view.viewpoint, box=box)
     if not visible.any():
         raise MeshError("No vertex of the scene is visible from the viewpoint.")
     return VisibilityStage(visible=visible, counts={"visible": int(visible.sum())})

@@ -21,10 +21,15 @@ class Between:
     """Looks for edges that have begun to pierce triangles, and for what changed places where S cuts it."""
 
     def __init__(
-        self, vertices: NDArray[np.float64], faces: NDArray[np.int64], laplacian: sp.csr_array
+        self,
+        vertices: NDArray[np.float64],
+        faces: NDArray[np.int64],
+        laplacian: sp.csr_array,
+        edges: NDArray[np.int64] | None = None,
     ) -> None:
         self._vertices, self._faces = vertices, faces
-        self._edges, self._raster = edges_of(faces), Raster(vertices, faces)
+        self._edges = edges_of(faces) if edges is None else edges
+        self._raster = Raster(vertices, faces)
         self._corners, self._ends = np.ascontiguousarray(faces.T), np.ascontiguousarray(self._edges.T)
         self._last = np.full(len(vertices), np.nan)
         self._parted = Parted(vertices, faces, laplacian, self._raster)
@@ -36,16 +41,20 @@ class Between:
         self._last = z
         a, b, c = self._corners
         changed = moved[a] | moved[b] | moved[c]
-        near = np.ones(len(faces), dtype=bool) if changed.all() else self._raster.over_or_under(changed)
-        at = np.zeros(len(z), dtype=bool)
-        at[faces[near]] = True
-        first, last = self._ends
-        edges = self._edges[at[first] & at[last]]
-        # Edges that moved may pierce what lies near; the others, triangles that moved.
-        own = moved[edges[:, 0]] | moved[edges[:, 1]]
-        looked = [new_crossings(vertices, faces[near], edges[own], z)]
-        if not own.all():
-            looked.append(new_crossings(vertices, faces[changed], edges[~own], z))
+        if changed.all():
+            near, edges = changed, self._edges
+            looked = [new_crossings(vertices, faces, edges, z)]
+        else:
+            near = self._raster.over_or_under(changed)
+            at = np.zeros(len(z), dtype=bool)
+            at[faces[near]] = True
+            first, last = self._ends
+            edges = self._edges[at[first] & at[last]]
+            # Edges that moved may pierce what lies near; the others, triangles that moved.
+            own = moved[edges[:, 0]] | moved[edges[:, 1]]
+            looked = [new_crossings(vertices, faces[near], edges[own], z)]
+            if not own.all():
+                looked.append(new_crossings(vertices, faces[changed], edges[~own], z))
         in_front, behind = z > 0.0, z < 0.0
         cut = near & (in_front[a] | in_front[b] | in_front[c]) & (behind[a] | behind[b] | behind[c])
         at_foot = foot_pairs(vertices, faces[near & self._raster.over_or_under(cut)], edges, z)

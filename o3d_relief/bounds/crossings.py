@@ -35,6 +35,10 @@ _CLOSE = 0.02
 _INSIDE = 1e-4
 """Share at both ends of an edge that does not count as crossing: there it meets its neighbours."""
 
+_OVER = 3e-5
+"""How far over its edge a ray passes, in relief units: it does not meet the triangles of the edge, and of
+the crossings that count it misses none."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Crossings:
@@ -185,10 +189,10 @@ def crossings(vertices: NDArray[np.float64], faces: NDArray[np.int64], edges: ND
     if len(edges) == 0:  # all that is left of the relief has shrunk to lines
         return _stretches(vertices[:, :2], edges[none], faces[none])
     scene, middle, size = unit_box(vertices, faces)
-    places = (vertices - middle) / size
+    places = (vertices - middle + [0.0, 0.0, _OVER]) / size
     rays = _rays(places, edges)
-    # Whether a ray meets anything between its ends is known fast; where, takes its whole line. One in six
-    # meets the triangles of its own edge, by a rounding error: most of these do not on the way back.
+    # Whether a ray meets anything between its ends is known fast; where, takes its whole line. Some meet
+    # triangles next to their own edge, by a rounding error: most of these do not on the way back.
     candidates = np.flatnonzero(_meets(scene, rays))
     if len(candidates):
         candidates = candidates[_meets(scene, _rays(places, edges[candidates][:, ::-1]))]

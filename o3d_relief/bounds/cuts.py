@@ -44,8 +44,10 @@ def cut_crossings(
     count : int
         Number of crossings.
     """
-    one, two, three = (np.sign(z).astype(np.int8)[faces[:, corner]] for corner in range(3))
-    cut = np.flatnonzero((one + two + three == 1) & (one * two * three < 0))
+    # Two corners in front of S, one behind.
+    side = np.where(z > 0.0, 1, np.where(z < 0.0, -5, 0)).astype(np.int8)
+    one, two, three = np.ascontiguousarray(faces.T)
+    cut = np.flatnonzero(side[one] + side[two] + side[three] == -3)
     cut = cut[_narrow(vertices[:, :2], faces[cut])]
     if len(cut) == 0:
         return Pairs.join([]), 0

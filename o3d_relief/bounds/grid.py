@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from o3d_relief.bounds.lines import UP, Lines, weights_of
+from o3d_relief.bounds.lines import UP, Lines
 from o3d_relief.bounds.pairs import Pairs, next_to_each_other
 
 __all__ = ["grid_pairs"]
@@ -40,21 +40,17 @@ def grid_pairs(
     """
     if len(lines.faces) == 0:
         return Pairs.join([])
-    box, vertices, faces = lines.box, lines.vertices, lines.faces
+    vertices, faces = lines.vertices, lines.faces
     low = vertices.min(axis=0) if low is None else low
     high = vertices.max(axis=0) if high is None else high
     steps = (np.arange(side) + 0.5) / side
     x, y = np.meshgrid(low[0] + steps * (high[0] - low[0]), low[1] + steps * (high[1] - low[1]))
     start = np.stack(
-        [x.ravel(), y.ravel(), np.full(side * side, vertices[:, 2].min() - 0.01 * box.size)], axis=1
+        [x.ravel(), y.ravel(), np.full(side * side, vertices[:, 2].min() - 0.01 * lines.size)], axis=1
     )
-    hits = box.scene.list_intersections(box.rays(start, UP))
-    triangle = hits["primitive_ids"].numpy().astype(np.int64)
-    weights = weights_of(hits["primitive_uvs"].numpy())
-    usable = np.flatnonzero(~lines.borders.grazed(triangle, weights))
-    triangle, weights = triangle[usable], weights[usable]
-    line = hits["ray_ids"].numpy()[usable].astype(np.int64)
-    t = hits["t_hit"].numpy()[usable].astype(np.float64)
+    hits = lines.all(start, UP)
+    hits = hits.select(np.flatnonzero(~lines.borders.grazed(hits.triangle, hits.weights)))
+    triangle, weights, line, t = hits.triangle, hits.weights, hits.ray, hits.distance / lines.size
     # One sort by line and height on it: t is well below the factor's size, and float64 has room for both.
     order = np.argsort(line + t / (4.0 * max(float(t.max(initial=0.0)), 1.0)), kind="stable")
     following = np.flatnonzero(line[order][1:] == line[order][:-1])

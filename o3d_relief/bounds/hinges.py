@@ -49,11 +49,15 @@ def hinged_pairs(
     1
     """
     front = z > 0.0
-    one, two, three = (front[faces[:, corner]] for corner in range(3))
+    one, two, three = (front[corner] for corner in np.ascontiguousarray(faces.T))
     cut = faces[(one != two) | (two != three)]
     beside = np.zeros(len(z), dtype=bool)
     beside[cut] = True
-    chosen = pairs.select(np.flatnonzero(beside[pairs.upper].all(axis=1) & beside[pairs.lower].all(axis=1)))
+    likely = np.flatnonzero(beside[pairs.upper[:, 0]] & beside[pairs.lower[:, 0]])
+    chosen = pairs.select(likely)
+    chosen = chosen.select(
+        np.flatnonzero(beside[chosen.upper].all(axis=1) & beside[chosen.lower].all(axis=1))
+    )
     upper, lower = chosen.heights(z)
     chosen = chosen.select((upper - lower < -_EXACT) & (lower <= 0.0))
     above = _holding(chosen.upper, chosen.upper_weights)

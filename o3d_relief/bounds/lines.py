@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
-from o3d_relief.rays import unit_box
+from o3d_relief.rays import UnitBox
 
-__all__ = ["MISS", "SAME_PLACE", "UP", "Borders", "Lines", "UnitBox", "upright", "weights_of"]
+__all__ = ["FROM", "MISS", "SAME_PLACE", "UP", "Borders", "Hits", "Lines", "upright", "weights_of"]
 
 SAME_PLACE = 5e-4
 """Points of a line that are closer than this, in relief units, are one: rays are cast in float32."""
+
+FROM = 0.1 * SAME_PLACE
+"""Where rays begin above or below a vertex: right at it they meet its own triangles."""
 
 _UPRIGHT = 0.01
 """Share of its area at which a triangle, seen from the front, counts as upright: there an error of float32 in
@@ -93,18 +97,50 @@ class Borders:
         return grazed
 
 
-class UnitBox:
-    """A mesh in the unit box, and rays of one direction through it."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Hits:
+    """What rays have met first.
 
-    def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
-        self.scene, self.middle, self.size = unit_box(vertices, faces)
+    Attributes
+    ----------
+    ray : (h,) int64
+        Numbers of the rays that have met anything, rising.
+    triangle : (h,) int64
+    weights : (h, 3) float64
+        Barycentric coordinates in it.
+    distance : (h,) float64
+        From where the ray begins, in relief units.
+    """
 
-    def rays(self, origins: NDArray[np.float64], direction: NDArray[np.float64]) -> o3d.core.Tensor:
-        """Return rays from origins (q, 3), of the mesh's frame, in one direction (3,)."""
-        rays = np.zeros((len(origins), 6), dtype=np.float32)
-        rays[:, :3] = (origins - self.middle) / self.size
-        rays[:, 3:] = direction
-        return o3d.core.Tensor(rays)
+    ray: NDArray[np.int64]
+    triangle: NDArray[np.int64]
+    weights: NDArray[np.float64]
+    distance: NDArray[np.float64]
+
+    def select(self, number: NDArray[np.int64]) -> Hits:
+        """Return some of them, by number."""
+        return Hits(
+            ray=self.ray.take(number),
+            triangle=self.triangle.take(number),
+            weights=self.weights.take(number, axis=0),
+            distance=self.distance.take(number),
+        )
+
+    def of(self, numbers: NDArray[np.int64]) -> Hits:
+        """Return the same with other numbers of the rays: those at these places of a list, rising."""
+        return Hits(
+            ray=numbers[self.ray], triangle=self.triangle, weights=self.weights, distance=self.distance
+        )
+
+    def joined(self, other: Hits) -> Hits:
+        """Return both, by rising ray."""
+        everything = Hits(
+            ray=np.concatenate([self.ray, other.ray]),
+            triangle=np.concatenate([self.triangle, other.triangle]),
+            weights=np.concatenate([self.weights, other.weights]),
+            distance=np.concatenate([self.distance, other.distance]),
+        )
+        return everything.select(np.argsort(everything.ray, kind="stable"))
 
 
 class Lines:
@@ -117,32 +153,93 @@ class Lines:
     vertices : (n, 3) float64
         In the relief frame, in relief units.
     faces : (m, 3) int64
+    box : UnitBox, optional
+        All of the mesh, upright faces as well, where that is at hand already.
 
     Attributes
     ----------
     vertices : (n, 3) float64
     faces : (l, 3) int64
-    box : UnitBox
     borders : Borders
+    size : float
+        The largest extent of the mesh, in relief units.
+    above, below : Hits
+        What the lines through the vertices meet first, from 5e-5 relief units above or below them on.
     """
 
-    def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
-        self.vertices, self._all = vertices, faces
+    def __init__(
+        self, vertices: NDArray[np.float64], faces: NDArray[np.int64], box: UnitBox | None = None
+    ) -> None:
+        self.vertices, self._all, self._given = vertices, faces, box
+
+    @cached_property
+    def _lying(self) -> NDArray[np.bool_]:
+        return ~upright(self.vertices, self._all)
 
     @cached_property
     def faces(self) -> NDArray[np.int64]:
         """The faces that do not stand upright."""
-        return self._all[~upright(self.vertices, self._all)]
+        return self._all[self._lying]
 
     @cached_property
-    def box(self) -> UnitBox:
-        """Their scene."""
-        return UnitBox(self.vertices, self.faces)
+    def _box(self) -> UnitBox:
+        return UnitBox(self.vertices, self.faces) if self._given is None else self._given
+
+    @cached_property
+    def _number(self) -> NDArray[np.int64]:
+        """The number of each face of the box among those that do not stand upright, -1 for the others."""
+        if self._given is None:
+            return np.arange(len(self.faces))
+        return np.where(self._lying, np.cumsum(self._lying) - 1, -1)
+
+    @property
+    def size(self) -> float:
+        """The largest extent."""
+        return self._box.size
 
     @cached_property
     def borders(self) -> Borders:
         """Their borders."""
         return Borders(self.vertices, self.faces)
+
+    @cached_property
+    def above(self) -> Hits:
+        """What is met first above the vertices."""
+        return self.first(self.vertices + FROM * UP, UP)
+
+    @cached_property
+    def below(self) -> Hits:
+        """What is met first below the vertices."""
+        return self.first(self.vertices - FROM * UP, -UP)
+
+    def first(self, origins: NDArray[np.float64], direction: NDArray[np.float64]) -> Hits:
+        """Return what is met first from origins (q, 3) on, in one direction along z."""
+        found = self._hits(self._box.scene.cast_rays(self._box.rays(origins, direction)))
+        standing = found.triangle < 0
+        if not standing.any():
+            return found
+        # Behind what stands upright may be what is met first.
+        ray = found.ray[standing]
+        behind = self.all(origins[ray], direction)
+        order = np.lexsort((behind.distance, behind.ray))
+        nearest = behind.select(order[np.flatnonzero(np.diff(behind.ray[order], prepend=-1))])
+        return found.select(np.flatnonzero(~standing)).joined(nearest.of(ray))
+
+    def all(self, origins: NDArray[np.float64], direction: NDArray[np.float64]) -> Hits:
+        """Return all that is met from origins (q, 3) on, in one direction along z, by ray, in no order."""
+        found = self._hits(self._box.scene.list_intersections(self._box.rays(origins, direction)))
+        return found.select(np.flatnonzero(found.triangle >= 0))
+
+    def _hits(self, answer: dict[str, o3d.core.Tensor]) -> Hits:
+        """Read what a scene answers."""
+        triangle = answer["primitive_ids"].numpy()
+        met = np.flatnonzero(triangle != MISS)
+        return Hits(
+            ray=answer["ray_ids"].numpy()[met].astype(np.int64) if "ray_ids" in answer else met,
+            triangle=self._number[triangle[met].astype(np.int64)],
+            weights=weights_of(answer["primitive_uvs"].numpy()[met]),
+            distance=answer["t_hit"].numpy()[met].astype(np.float64) * self._box.size,
+        )
 
 
 def weights_of(uv: NDArray[np.float32]) -> NDArray[np.float64]:

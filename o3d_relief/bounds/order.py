@@ -58,6 +58,7 @@ def keep_order(
     z: NDArray[np.float64],
     pairs: Pairs,
     *,
+    edges: NDArray[np.int64] | None = None,
     in_front: NDArray[np.bool_] | None = None,
     min_gap: float = 0.0,
     tick: Tick = silent,
@@ -82,6 +83,8 @@ def keep_order(
     z : (n,) float64
         Heights to correct.
     pairs : Pairs
+    edges : (e, 2) int64, optional
+        Those of the mesh, where they are at hand already.
     in_front : (n,) bool, optional
         Vertices that must not end behind S.
     min_gap : float
@@ -101,7 +104,7 @@ def keep_order(
     """
     front = np.zeros(len(z), dtype=bool) if in_front is None else in_front
     system = Correction(vertices, laplacian, areas, z)
-    lines, between = _Lines(pairs, len(z), min_gap), Between(vertices, faces, laplacian)
+    lines, between = _Lines(pairs, len(z), min_gap), Between(vertices, faces, laplacian, edges)
     further, floor = Pairs.join([]), np.zeros(len(z), dtype=bool)
     current, best, fewest, rounds, first = z, z, np.inf, 0, 0
     while True:
@@ -158,6 +161,9 @@ class _Lines:
         """Find what is wrong now; only pairs of which a vertex has moved can have changed."""
         moved = z != self._last
         self._last = z
+        if moved.all():
+            self.wrong = out_of_order(self._pairs, z, min_gap=self._min_gap)
+            return
         of_moved = np.zeros(len(self._pairs), dtype=bool)
         for corner in self._corners:
             of_moved |= moved[corner]

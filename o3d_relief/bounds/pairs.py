@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from o3d_relief.bounds.lines import MISS, SAME_PLACE, UP, Lines, upright, weights_of
+from o3d_relief.bounds.lines import FROM, SAME_PLACE, UP, Hits, Lines, upright
 
 __all__ = ["Pairs", "as_points", "close_pairs", "foot_pairs", "next_to_each_other", "vertex_pairs"]
 
@@ -113,9 +113,20 @@ def vertex_pairs(lines: Lines, *, aside: tuple[float, float] = (0.0, 0.0)) -> Pa
     """
     if len(lines.faces) == 0:
         return Pairs.join([])
-    everything = np.arange(len(lines.vertices))
-    steps = [np.array([*aside, 2 * SAME_PLACE * up]) for up in (1.0, -1.0)]
-    return Pairs.join([_next_pairs(lines, everything, step) for step in steps])
+    found = []
+    for up in (1.0, -1.0):
+        step = np.array([*aside, 2 * SAME_PLACE * up])
+        if any(aside):
+            found.append(_paired(lines, lines.first(lines.vertices + step, up * UP), up))
+            continue
+        hits = lines.above if up > 0.0 else lines.below
+        near = hits.distance < 2 * SAME_PLACE - FROM
+        found.append(_paired(lines, hits.select(np.flatnonzero(~near)), up))
+        if near.any():
+            again = hits.ray[near]
+            further = lines.first(lines.vertices[again] + step, up * UP)
+            found.append(_paired(lines, further.of(again), up))
+    return Pairs.join(found)
 
 
 def close_pairs(lines: Lines) -> Pairs:
@@ -133,35 +144,24 @@ def close_pairs(lines: Lines) -> Pairs:
     """
     if len(lines.faces) == 0:
         return Pairs.join([])
-    box, found = lines.box, []
-    for direction in (UP, -UP):
-        step = 0.1 * SAME_PLACE * direction
-        rays = box.rays(lines.vertices + step, direction)
-        reach = 2.2 * SAME_PLACE / box.size
-        candidates = np.flatnonzero(box.scene.test_occlusions(rays, tfar=reach).numpy())
-        if len(candidates):
-            close = _next_pairs(lines, candidates, step)
-            found.append(close.select((close.gap > SAME_PLACE) & (close.gap < 2.2 * SAME_PLACE)))
+    found = []
+    for up, hits in ((1.0, lines.above), (-1.0, lines.below)):
+        close = _paired(lines, hits.select(np.flatnonzero(hits.distance <= 2.2 * SAME_PLACE)), up)
+        found.append(close.select((close.gap > SAME_PLACE) & (close.gap < 2.2 * SAME_PLACE)))
     return Pairs.join(found)
 
 
-def _next_pairs(lines: Lines, chosen: NDArray[np.int64], step: NDArray[np.float64]) -> Pairs:
-    """Pair chosen vertices with the next surface above or below a step aside, from there on."""
-    vertices, faces = lines.vertices, lines.faces
-    direction = np.array([0.0, 0.0, np.sign(step[2])])
-    hits = lines.box.scene.cast_rays(lines.box.rays(vertices[chosen] + step, direction))
-    met = np.flatnonzero(hits["primitive_ids"].numpy() != MISS)
-    triangle = hits["primitive_ids"].numpy()[met].astype(np.int64)
-    other_weights = weights_of(hits["primitive_uvs"].numpy()[met])
-    hit, other = chosen[met], faces.take(triangle, axis=0)
+def _paired(lines: Lines, hits: Hits, up: float) -> Pairs:
+    """Pair the vertices, from which the rays come, with what they have met, upwards or downwards."""
+    hit, other = hits.ray, lines.faces.take(hits.triangle, axis=0)
     # A ray may meet a steep triangle of its own vertex.
     elsewhere = (other[:, 0] != hit) & (other[:, 1] != hit) & (other[:, 2] != hit)
-    usable = np.flatnonzero(elsewhere & ~lines.borders.grazed(triangle, other_weights))
-    other, other_weights = other.take(usable, axis=0), other_weights.take(usable, axis=0)
+    usable = np.flatnonzero(elsewhere & ~lines.borders.grazed(hits.triangle, hits.weights))
+    other, other_weights = other.take(usable, axis=0), hits.weights.take(usable, axis=0)
     own, own_weights = as_points(hit[usable])
-    if direction[2] > 0:
-        return next_to_each_other(vertices[:, 2], other, other_weights, own, own_weights)
-    return next_to_each_other(vertices[:, 2], own, own_weights, other, other_weights)
+    if up > 0.0:
+        return next_to_each_other(lines.vertices[:, 2], other, other_weights, own, own_weights)
+    return next_to_each_other(lines.vertices[:, 2], own, own_weights, other, other_weights)
 
 
 def foot_pairs(
@@ -196,10 +196,8 @@ def foot_pairs(
     share = z[edges[:, 0]] / (z[edges[:, 0]] - z[edges[:, 1]])
     foot = vertices[edges[:, 0]] + share[:, None] * (vertices[edges[:, 1]] - vertices[edges[:, 0]])
     foot[:, 2] = 2 * SAME_PLACE
-    hits = lines.box.scene.cast_rays(lines.box.rays(foot, UP))
-    hit = np.flatnonzero(hits["primitive_ids"].numpy() != MISS)
-    triangle = hits["primitive_ids"].numpy()[hit].astype(np.int64)
-    weights = weights_of(hits["primitive_uvs"].numpy()[hit])
+    hits = lines.first(foot, UP)
+    hit, triangle, weights = hits.ray, hits.triangle, hits.weights
     own = (lines.faces[triangle][:, :, None] == edges[hit][:, None, :]).any(axis=1).all(axis=1)
     usable = ~own & ~lines.borders.grazed(triangle, weights)
     hit, other, other_weights = hit[usable], lines.faces[triangle[usable]], weights[usable]

@@ -10,6 +10,8 @@ __all__ = ["Raster"]
 _CELLS = 256
 """Raster, to each side, on which is looked up what lies above and below what moved."""
 
+_WIDE = _CELLS + 1
+
 
 class Raster:
     """Boxes of triangles, seen from the front, in cells."""
@@ -17,21 +19,27 @@ class Raster:
     def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
         low, high = vertices[:, :2].min(axis=0), vertices[:, :2].max(axis=0)
         cell = np.ascontiguousarray(((vertices[:, :2] - low) / (high - low + 1e-9) * _CELLS).T).astype(
-            np.int64
+            np.int32
         )
         a, b, c = (cell[:, corner] for corner in np.ascontiguousarray(faces.T))
-        self._first = np.minimum(np.minimum(a, b), c)
-        self._last = np.maximum(np.maximum(a, b), c) + 1
+        (left, bottom), (right, top) = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c) + 1
+        # Both corners of each box, and the other two, in a raster of one cell more.
+        self._plus = left * _WIDE + bottom, right * _WIDE + top
+        self._minus = left * _WIDE + top, right * _WIDE + bottom
 
     def over_or_under(self, changed: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Find the triangles (m,) that may lie above or below some of them, (m,)."""
-        (left, bottom), (right, top) = self._first, self._last
+        chosen = np.flatnonzero(changed)
         # Count, in each cell of a raster, the boxes of triangles that changed; then ask for the boxes of all.
-        steps = np.zeros((_CELLS + 1, _CELLS + 1), dtype=np.int64)
-        for x, y, sign in ((left, bottom, 1), (right, top, 1), (left, top, -1), (right, bottom, -1)):
-            np.add.at(steps, (x[changed], y[changed]), sign)
-        marked = steps.cumsum(axis=0).cumsum(axis=1)[:-1, :-1] > 0
-        total = np.zeros((_CELLS + 1, _CELLS + 1), dtype=np.int64)
+        steps = np.zeros(_WIDE * _WIDE, dtype=np.int64)
+        for corners, sign in ((self._plus, 1), (self._minus, -1)):
+            for corner in corners:
+                steps += sign * np.bincount(corner[chosen], minlength=len(steps))
+        marked = steps.reshape(_WIDE, _WIDE).cumsum(axis=0).cumsum(axis=1)[:-1, :-1] > 0
+        total = np.zeros((_WIDE, _WIDE), dtype=np.int32)
         total[1:, 1:] = marked.cumsum(axis=0).cumsum(axis=1)
-        within = total[right, top] - total[left, top] - total[right, bottom] + total[left, bottom]
+        flat = total.ravel()
+        within = flat[self._plus[0]] + flat[self._plus[1]]
+        within -= flat[self._minus[0]]
+        within -= flat[self._minus[1]]
         return np.asarray(within > 0)

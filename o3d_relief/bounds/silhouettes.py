@@ -9,7 +9,7 @@ from o3d_relief.bounds.aligned import APART, aligned_pairs
 from o3d_relief.bounds.footprints import footprints
 from o3d_relief.bounds.pairs import Pairs
 
-__all__ = ["silhouette_pairs", "silhouettes"]
+__all__ = ["edges_that_turn", "silhouette_pairs", "silhouettes"]
 
 _FEWEST_CELLS, _MOST_CELLS = 128, 4096
 """Raster, along the longer side, in whose cells edges that may cross are looked up: four for each edge."""
@@ -22,9 +22,6 @@ _CLEAR = 1e-3
 
 _BLOCK = 16384
 """Edges that are worked on at once."""
-
-_CORNERS = np.array([[1, 2, 0], [2, 0, 1], [0, 1, 2]])
-"""Of each edge of a triangle: both ends, and the corner opposite."""
 
 
 def silhouettes(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -41,32 +38,49 @@ def silhouettes(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDAr
         Edges of one face or of more than two, those whose two faces lie on the same side, and those of faces
         that stand upright.
     """
-    edges, turning = _edges_that_turn(vertices, faces)
+    edges, turning = edges_that_turn(vertices, faces)
     return edges[turning]
 
 
-def _edges_that_turn(
+def edges_that_turn(
     vertices: NDArray[np.float64], faces: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Return all edges as `edges_of` does, (e, 2), and which of them are silhouettes, (e,)."""
+    """Find all edges, and those at which a surface, seen from the front, ends or turns back.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+    faces : (m, 3) int64
+
+    Returns
+    -------
+    edges : (e, 2) int64
+        As `edges_of` does.
+    turning : (e,) bool
+        See `silhouettes`.
+    """
+    n = len(vertices)
     x, y = np.ascontiguousarray(vertices[:, :2].T)
-    corners = np.ascontiguousarray(faces.T)
+    a, b, c = corners = np.ascontiguousarray(faces.T)
+    facing = np.sign((x[b] - x[a]) * (y[c] - y[a]) - (y[b] - y[a]) * (x[c] - x[a])).astype(np.int64)
     keys = []
-    for start, end, opposite in corners[_CORNERS]:
-        low, high = np.minimum(start, end), np.maximum(start, end)
-        along_x, along_y = x[high] - x[low], y[high] - y[low]
-        side = np.sign(along_x * (y[opposite] - y[low]) - along_y * (x[opposite] - x[low]))
-        # The side of the third corner, -1, 0 or 1, goes into the last two bits.
-        keys.append(4 * (low * len(vertices) + high) + side.astype(np.int64) + 1)
-    sided = np.sort(np.concatenate(keys))
+    for start, end in zip(corners, corners[[1, 2, 0]], strict=True):
+        # The side of the third corner, as seen along rising numbers, goes into the last two bits.
+        rising = start < end
+        keys.append(np.where(rising, start * (4 * n) + 4 * end + facing, end * (4 * n) + 4 * start - facing))
+    sided = np.sort(np.concatenate(keys) + 1)
     edge, side = sided >> 2, (sided & 3) - 1
     first = np.flatnonzero(np.diff(edge, prepend=-1))
     count = np.diff(np.append(first, len(edge)))
     plain = (count == 2) & (side[first] * side[np.minimum(first + 1, len(edge) - 1)] < 0)
-    return np.stack(np.divmod(edge[first], len(vertices)), axis=1), ~plain
+    return np.stack(np.divmod(edge[first], n), axis=1), ~plain
 
 
-def silhouette_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Pairs:
+def silhouette_pairs(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    turns: tuple[NDArray[np.int64], NDArray[np.bool_]] | None = None,
+) -> Pairs:
     """Pair the points of two silhouettes that cross in the picture.
 
     Where surfaces have changed places, they did so in a part of the picture that ends where they cross each
@@ -79,6 +93,8 @@ def silhouette_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64]) ->
     vertices : (n, 3) float64
         In the relief frame, in relief units.
     faces : (m, 3) int64
+    turns : optional
+        What `edges_that_turn` returns, where that is at hand already.
 
     Returns
     -------
@@ -93,7 +109,7 @@ def silhouette_pairs(vertices: NDArray[np.float64], faces: NDArray[np.int64]) ->
     >>> silhouette_pairs(places, np.array([[0, 1, 2], [3, 4, 5]])).gap.tolist()
     [1.0, 1.0, 1.0, 1.0]
     """
-    edges, turning = _edges_that_turn(vertices, faces)
+    edges, turning = edges_that_turn(vertices, faces) if turns is None else turns
     plane = np.ascontiguousarray(vertices[:, :2])
     # Of edges on top of each other, one tells where all of them cross others.
     prints = footprints(vertices, faces, edges, np.flatnonzero(turning))

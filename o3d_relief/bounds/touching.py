@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from o3d_relief.bounds.lines import UnitBox, weights_of
+from o3d_relief.bounds.lines import weights_of
 from o3d_relief.bounds.pairs import Pairs, as_points
+from o3d_relief.rays import UnitBox
 
 __all__ = ["touching_pairs"]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,7 +16,7 @@ from o3d_relief.linalg.factor import Factor
 from o3d_relief.linalg.multigrid import Multigrid, multigrid
 from o3d_relief.progress import Tick, silent
 
-__all__ = ["FACTORISED_UP_TO", "multigrid", "solve_direct", "solve_spd"]
+__all__ = ["FACTORISED_UP_TO", "conjugate_gradients", "multigrid", "solve_direct", "solve_spd"]
 
 FACTORISED_UP_TO = 4000
 """Unknowns up to which any system is factorised."""
@@ -34,6 +35,7 @@ def solve_spd(
     right_hand_side: NDArray[np.float64],
     *,
     similar: sp.csr_array | None = None,
+    cycle: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
     direct_up_to: int = FACTORISED_UP_TO,
     tolerance: float = 1e-12,
     error: float = 0.0,
@@ -53,6 +55,8 @@ def solve_spd(
     similar : (n, n) sparse float64, optional
         A second-order operator that is spectrally close to `matrix`, to build the multigrid on;
         `matrix` itself where omitted.
+    cycle : callable, optional
+        A preconditioner that is at hand already, in place of a new multigrid.
     direct_up_to : int
         Unknowns up to which the matrix is factorised; systems of many small bodies have sparse factors.
     tolerance : float
@@ -86,10 +90,10 @@ def solve_spd(
         if n <= direct_up_to:
             solution = Factor(matrix, None).solve(right_hand_side)
         else:
-            cycle = Multigrid(matrix if similar is None else similar)
+            cycle = Multigrid(matrix if similar is None else similar) if cycle is None else cycle
             start = np.zeros(n) if start is None else start
-            solution, left = _conjugate_gradients(
-                matrix, right_hand_side, start, cycle, tolerance, error, tick
+            solution, left = conjugate_gradients(
+                matrix, right_hand_side, start, cycle, tolerance=tolerance, error=error, tick=tick
             )
         residual = np.linalg.norm(matrix @ solution - right_hand_side)
         reached = float(residual / np.linalg.norm(right_hand_side))
@@ -129,22 +133,49 @@ def solve_direct(matrix: sp.csr_array, right_hand_side: NDArray[np.float64]) -> 
     return np.asarray(factor.solve(right_hand_side), dtype=np.float64)
 
 
-def _conjugate_gradients(
-    matrix: sp.csr_array,
+class _Matrix(Protocol):
+    """Anything that is multiplied by a vector."""
+
+    def __matmul__(self, vector: NDArray[np.float64], /) -> NDArray[np.float64]: ...
+
+
+def conjugate_gradients(
+    matrix: _Matrix | sp.csr_array,
     right_hand_side: NDArray[np.float64],
     start: NDArray[np.float64],
     precondition: Callable[[NDArray[np.float64]], NDArray[np.float64]],
-    tolerance: float,
-    error: float,
-    tick: Tick,
+    *,
+    steps: int = _MAX_ITERATIONS,
+    tolerance: float = 1e-12,
+    error: float = 0.0,
+    tick: Tick = silent,
 ) -> tuple[NDArray[np.float64], float]:
-    """Iterate until the residual or the error is small enough; tell the squared energy norm of the error."""
+    """Iterate until the residual or the error is small enough, or for so many steps.
+
+    Parameters
+    ----------
+    matrix : (n, n) symmetric positive definite
+        Only its products with vectors are asked for.
+    right_hand_side, start : (n,) float64
+    precondition : callable
+        Symmetric positive definite, too.
+    steps : int
+    tolerance, error : float
+        See `solve_spd`.
+    tick : callable, optional
+
+    Returns
+    -------
+    solution : (n,) float64
+    left : float
+        An estimate of the squared energy norm of the error.
+    """
     solution = start.copy()
     residual = right_hand_side - matrix @ solution
     small = tolerance * float(np.linalg.norm(right_hand_side))
     direction, last = np.zeros(0), 0.0
     gains: list[float] = []
-    for _ in range(_MAX_ITERATIONS):
+    for _ in range(steps):
         tick(None)
         steepest = precondition(residual)
         now = float(residual @ steepest)

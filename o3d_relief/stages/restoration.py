@@ -8,21 +8,13 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from o3d_relief.linalg.solve import solve_spd
+from o3d_relief.linalg.obstacle import minimise_above
 from o3d_relief.progress import Tick, silent
 
 __all__ = ["Restoration", "restore"]
 
-_BELOW = 1e-6
-"""Relief units below the floor that count as on it in the search; the result is set onto it."""
-
 _EXACT = 1e-6
-"""Energy norm of the error, in relief units, to which each system is solved."""
-
-_ROUGH = 1e-3
-"""The same while the vertices on the floor are still being found."""
-
-_ROUNDS = 30
+"""Energy norm of the error, in relief units, to which the system is solved."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -114,103 +106,36 @@ def restore(
     has_point[label[index]] = True
     solved &= has_point[label]
 
-    lowest = np.where(solved, -np.inf if floor is None else floor, -np.inf)
-    system = _System(laplacian, np.flatnonzero(solved), blend, tick)
-    result, on_floor, rounds = _above_floor(system, vertices[:, 2], z, lowest)
+    rows = np.flatnonzero(solved)
+    first, operator = _operators(laplacian, rows, blend)
+    displacement = z - vertices[:, 2]
+    displacement[rows] = 0.0
+    lowest = np.full(len(rows), -np.inf) if floor is None else floor[rows]
+    found = minimise_above(
+        operator[:, rows].tocsr(),
+        -(operator @ displacement),
+        lowest - vertices[rows, 2],
+        similar=first[:, rows].tocsr(),
+        error=_EXACT,
+        tick=tick,
+    )
+    result = z.copy()
+    result[rows] = np.where(found.on_bound, lowest, np.maximum(vertices[rows, 2] + found.x, lowest))
     return Restoration(
         z=result,
         solved=solved,
         points_held=len(held),
-        set_on_floor=int(on_floor.sum()),
-        rounds=rounds,
+        set_on_floor=int(found.on_bound.sum()),
+        rounds=found.rounds,
     )
 
 
-def _above_floor(
-    system: _System,
-    original: NDArray[np.float64],
-    z: NDArray[np.float64],
-    floor: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.bool_], int]:
-    """Solve subject to z >= floor; return the heights, the vertices on the floor, the rounds."""
-    on_floor = np.zeros(len(z), dtype=bool)
-    rounds = 0
-    error = _ROUGH if np.isfinite(floor).any() else _EXACT
-    while True:
-        result, force = system.solve(original, np.where(on_floor, floor, z), on_floor, error)
-        rounds += 1
-        below = ~on_floor & (result < floor - _BELOW)
-        # A vertex that is pulled towards the floor, not held off it, is let go.
-        released = on_floor & (force < 0.0)
-        if rounds > _ROUNDS:
-            # The active set goes round in a circle: from here on it only grows, and so comes to an end.
-            released[:] = False
-        if not below.any() and not released.any():
-            if error == _EXACT:
-                break
-            error = _EXACT
-        on_floor = (on_floor & ~released) | below
-    return np.maximum(result, floor), on_floor, rounds
-
-
-class _System:
-    """The rows t C + (1 - t) C D^-1 C of some vertices."""
-
-    def __init__(self, laplacian: sp.csr_array, rows: NDArray[np.int64], blend: float, tick: Tick) -> None:
-        first = laplacian[rows]
-        weight_sum = laplacian.diagonal()
-        inverse = np.where(weight_sum > 0.0, 1.0 / np.where(weight_sum > 0.0, weight_sum, 1.0), 0.0)
-        second = first @ sp.diags_array(inverse) @ laplacian
-        self._rows = rows
-        self._tick = tick
-        self._operator = (blend * first + (1.0 - blend) * second).tocsr()
-        self._within, self._first = self._operator[:, rows].tocsr(), first[:, rows].tocsr()
-        self._displacement = np.zeros(len(rows))
-
-    def solve(
-        self,
-        original: NDArray[np.float64],
-        z: NDArray[np.float64],
-        held: NDArray[np.bool_],
-        error: float,
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Solve for the rows that are not held; `z` counts everywhere else.
-
-        Starts from what was found the last time, when mostly the same rows were held.
-
-        Returns
-        -------
-        z : (n,) float64
-        force : (n,) float64
-            What pushes each held row towards the viewer; 0 elsewhere.
-        """
-        moving = ~held[self._rows]
-        columns = self._rows[moving]
-        displacement = z - original
-        displacement[columns] = 0.0
-        found = solve_spd(
-            _holding(self._within, moving),
-            np.where(moving, -(self._operator @ displacement), 0.0),
-            similar=_holding(self._first, moving),
-            error=error,
-            start=np.where(moving, self._displacement, 0.0),
-            tick=self._tick,
-        )
-        displacement[columns] = found[moving]
-        self._displacement = displacement[self._rows]
-        force = np.zeros(len(z))
-        force[self._rows[~moving]] = (self._operator @ displacement)[~moving]
-        result = z.copy()
-        result[columns] = original[columns] + displacement[columns]
-        return result, force
-
-
-def _holding(matrix: sp.csr_array, moving: NDArray[np.bool_]) -> sp.csr_array:
-    """Return a matrix of which the rows and columns that do not move have their diagonal left alone."""
-    if moving.all():
-        return matrix
-    row = np.repeat(np.arange(len(moving)), np.diff(matrix.indptr))
-    stays = (moving[row] & moving[matrix.indices]) | (row == matrix.indices)
-    count = np.concatenate([[0], np.cumsum(stays)])
-    parts = matrix.data[stays], matrix.indices[stays], count[matrix.indptr]
-    return sp.csr_array(parts, shape=matrix.shape)
+def _operators(
+    laplacian: sp.csr_array, rows: NDArray[np.int64], blend: float
+) -> tuple[sp.csr_array, sp.csr_array]:
+    """Return some rows, (r, n), of C and of t C + (1 - t) C D^-1 C."""
+    first = laplacian[rows]
+    weight_sum = laplacian.diagonal()
+    inverse = np.where(weight_sum > 0.0, 1.0 / np.where(weight_sum > 0.0, weight_sum, 1.0), 0.0)
+    second = first @ sp.diags_array(inverse) @ laplacian
+    return first, (blend * first + (1.0 - blend) * second).tocsr()

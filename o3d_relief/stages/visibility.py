@@ -7,7 +7,7 @@ import open3d as o3d
 from numpy.typing import NDArray
 
 from o3d_relief.errors import ParameterError
-from o3d_relief.rays import unit_box
+from o3d_relief.rays import UnitBox
 
 __all__ = ["turned_away", "visible_vertices"]
 
@@ -21,6 +21,7 @@ def visible_vertices(
     faces: NDArray[np.int64],
     *,
     viewpoint: tuple[float, float, float] | None = None,
+    box: UnitBox | None = None,
 ) -> NDArray[np.bool_]:
     """Find the vertices from which the open segment to the viewpoint u is free.
 
@@ -34,6 +35,8 @@ def visible_vertices(
     faces : (m, 3) int64
     viewpoint : three floats, optional
         u, in front of every vertex; infinitely far along +z where omitted.
+    box : UnitBox, optional
+        Of the mesh, where it is at hand already.
 
     Returns
     -------
@@ -50,7 +53,8 @@ def visible_vertices(
             f"viewpoint must lie in front of the scene (z > {front:g} relief units). "
             f"Got z = {viewpoint[2]:g} instead."
         )
-    scene, middle, size = unit_box(vertices, faces)
+    box = UnitBox(vertices, faces) if box is None else box
+    scene, middle, size = box.scene, box.middle, box.size
     rays = np.zeros((len(vertices), 6), dtype=np.float32)
     rays[:, 5] = 1.0
     if viewpoint is not None:
