@@ -7,9 +7,9 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as sla
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
-from threadpoolctl import threadpool_limits
 
 from o3d_relief.errors import SolverError
+from o3d_relief.linalg.one_thread import one_thread
 
 __all__ = ["Factor", "nested_dissection"]
 
@@ -118,7 +118,7 @@ class Factor:
         self.order.flags.writeable = False
         ordered = matrix[self.order][:, self.order].tocsc()
         try:
-            with threadpool_limits(limits=1):
+            with one_thread():
                 self._factor = sla.splu(
                     ordered,
                     permc_spec="NATURAL" if by_planes else "MMD_AT_PLUS_A",
@@ -136,5 +136,5 @@ class Factor:
 
     def solve_ordered(self, right_hand_sides: NDArray[np.float64]) -> NDArray[np.float64]:
         """Solve for (n,) or (n, q), whose rows, and those of the solution, are in `order`."""
-        with threadpool_limits(limits=1):
+        with one_thread():
             return np.asarray(self._factor.solve(right_hand_sides), dtype=np.float64)
