@@ -6,11 +6,11 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as sla
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from o3d_relief.errors import SolverError
 from o3d_relief.linalg.cholesky import Cholesky
 from o3d_relief.linalg.dissection import nested_dissection
+from o3d_relief.linalg.one_thread import one_thread
 
 __all__ = ["Factor"]
 
@@ -44,7 +44,7 @@ class Factor:
     def __init__(self, matrix: sp.csr_array, positions: NDArray[np.float64] | None) -> None:
         self.order = np.arange(matrix.shape[0])
         dissection = None if positions is None else nested_dissection(positions, matrix)
-        with threadpool_limits(limits=1):
+        with one_thread():
             if dissection is not None and dissection.cut < _BADLY_CUT:
                 self.order = dissection.order
                 self._factor: Cholesky | sla.SuperLU = Cholesky(matrix, dissection)
@@ -66,7 +66,7 @@ class Factor:
 
         With `overwrite` the solution may take the place of the right-hand sides.
         """
-        with threadpool_limits(limits=1):
+        with one_thread():
             if isinstance(self._factor, Cholesky):
                 return self._factor.solve(right_hand_sides, overwrite=overwrite)
             return np.asarray(self._factor.solve(right_hand_sides), dtype=np.float64)

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from o3d_relief.linalg.central_path import CentralPath
+from o3d_relief.linalg.one_thread import one_thread
 from o3d_relief.linalg.patches import Patches
 from o3d_relief.linalg.refining import Refining
 from o3d_relief.progress import Tick, share_of_way, silent
@@ -121,7 +121,7 @@ def minimise(
     -------
     Minimum
     """
-    with threadpool_limits(limits=1):  # sums that do not depend on the number of threads
+    with one_thread():  # sums that do not depend on the number of threads
         path = CentralPath(form, pull, origin, start, lower, upper, rows, bound, positions)
         refining = None
         if in_patches and positions is not None and len(pull) > _LARGE:

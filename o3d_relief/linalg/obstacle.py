@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from o3d_relief.linalg.held import HeldMatrix, HeldMultigrid
+from o3d_relief.linalg.one_thread import one_thread
 from o3d_relief.linalg.solve import FACTORISED_UP_TO, conjugate_gradients, solve_spd
 from o3d_relief.progress import Tick, silent
 
@@ -99,7 +99,7 @@ def minimise_above(
     if not np.isfinite(lowest).any():
         x = solve_spd(matrix, pull, similar=similar, error=error, tick=tick)
         return Above(x=x, on_bound=np.zeros(n, dtype=bool), rounds=1)
-    with threadpool_limits(limits=1):
+    with one_thread():
         solver = _Rounds(matrix, pull, similar, error, tick)
         x, held, rounds, exact = np.zeros(n), np.zeros(n, dtype=bool), 0, n <= _FEW
         while True:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from o3d_relief.linalg.factor import Factor
+from o3d_relief.linalg.one_thread import one_thread
 from o3d_relief.progress import Tick, silent
 
 __all__ = ["Responses"]
@@ -111,7 +111,7 @@ class Responses:
         if pull is not None and self._factor is not None:
             result[self._free] = self._factor.solve_ordered(pull[self._free])
             pulled = pull[self._index] - self._point_rows @ result
-        with threadpool_limits(limits=1):
+        with one_thread():
             if released.any():
                 force = pulled - self._schur @ points
                 points[released] = np.linalg.solve(self._schur[np.ix_(released, released)], force[released])

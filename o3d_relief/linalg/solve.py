@@ -9,11 +9,11 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as sla
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from o3d_relief.errors import SolverError
 from o3d_relief.linalg.factor import Factor
 from o3d_relief.linalg.multigrid import Multigrid, multigrid
+from o3d_relief.linalg.one_thread import one_thread
 from o3d_relief.progress import Tick, silent
 
 __all__ = ["FACTORISED_UP_TO", "conjugate_gradients", "multigrid", "solve_direct", "solve_spd"]
@@ -86,7 +86,7 @@ def solve_spd(
     if n == 0 or not right_hand_side.any():
         return np.zeros(n)
     left = np.inf
-    with threadpool_limits(limits=1):
+    with one_thread():
         if n <= direct_up_to:
             solution = Factor(matrix, None).solve(right_hand_side)
         else:

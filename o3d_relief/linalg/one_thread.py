@@ -1,0 +1,28 @@
+"""Sums on one thread, so that they do not depend on the number of threads."""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager
+from functools import cache
+from typing import Any, cast
+
+from threadpoolctl import ThreadpoolController
+
+__all__ = ["one_thread"]
+
+
+def one_thread() -> AbstractContextManager[Any]:
+    """Return a context in which the linear algebra of numpy and scipy uses one thread.
+
+    Examples
+    --------
+    >>> with one_thread():
+    ...     total = np.ones(3) @ np.ones(3)
+    """
+    return cast(AbstractContextManager[Any], _libraries().limit(limits=1))
+
+
+@cache
+def _libraries() -> ThreadpoolController:
+    """Find the libraries once, which takes milliseconds: numpy and scipy have loaded theirs by now."""
+    return ThreadpoolController()
