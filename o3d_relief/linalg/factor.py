@@ -94,11 +94,15 @@ class Factor:
     matrix : (n, n) sparse float64, CSR
     positions : (n, 3) float64 or None
         Of the vertices that the unknowns belong to; None: the unknowns are ordered by minimum degree.
+    ordered : bool
+        Take the unknowns in the order in which they are.
 
     Attributes
     ----------
     order : (n,) int64
         The unknowns in the order in which right-hand sides of several columns are given.
+    entries : int
+        Number of entries of the factor.
 
     Raises
     ------
@@ -106,7 +110,9 @@ class Factor:
         The matrix is singular.
     """
 
-    def __init__(self, matrix: sp.csr_array, positions: NDArray[np.float64] | None) -> None:
+    def __init__(
+        self, matrix: sp.csr_array, positions: NDArray[np.float64] | None, *, ordered: bool = False
+    ) -> None:
         n = matrix.shape[0]
         self.order, cut = np.arange(n), np.inf
         if positions is not None:
@@ -116,17 +122,24 @@ class Factor:
         if not by_planes:
             self.order = np.arange(n)
         self.order.flags.writeable = False
-        ordered = matrix[self.order][:, self.order].tocsc()
+        columns = (matrix[self.order][:, self.order] if by_planes else matrix).tocsc()
         try:
             with threadpool_limits(limits=1):
                 self._factor = sla.splu(
-                    ordered,
-                    permc_spec="NATURAL" if by_planes else "MMD_AT_PLUS_A",
+                    columns,
+                    permc_spec="NATURAL" if by_planes or ordered else "MMD_AT_PLUS_A",
+                    # Small panels are faster where the unknowns have few neighbours, as in spaces of patches.
+                    **({"panel_size": 4, "relax": 1} if ordered else {}),
                     diag_pivot_thresh=0.0,
                     options={"SymmetricMode": True},
                 )
         except RuntimeError as error:  # SuperLU: exactly singular
             raise SolverError(f"A linear system of {n} unknowns is singular.") from error
+        self.entries = int(self._factor.nnz)
+
+    def elimination(self) -> NDArray[np.int64]:
+        """Return the order in which the unknowns are eliminated, (n,)."""
+        return np.asarray(self.order[np.argsort(self._factor.perm_c)], dtype=np.int64)
 
     def solve(self, right_hand_side: NDArray[np.float64]) -> NDArray[np.float64]:
         """Solve for one right-hand side, (n,)."""
