@@ -67,7 +67,8 @@ class CentralPath:
         positions: NDArray[np.float64] | None = None,
     ) -> None:
         self.form, self.pull, self.origin = form, pull, origin
-        self.x = self.start = start
+        self.start = start
+        self._go_to(start)
         self.at_lower, self.at_upper = np.flatnonzero(np.isfinite(lower)), np.flatnonzero(np.isfinite(upper))
         self.lower, self.upper = lower[self.at_lower], upper[self.at_upper]
         self._others = NearRows(rows, bound)
@@ -80,9 +81,14 @@ class CentralPath:
         self._known = set[bytes]()
         self.newton: Everywhere | Within = Everywhere(form, positions)
 
+    def _go_to(self, x: Vector) -> None:
+        self.x, self._resisting = x, self.form @ (x - self.origin)
+
     def energy(self, x: Vector) -> float:
         """Return (x - o)' H (x - o) / 2."""
         moved = x - self.origin
+        if x is self.x:
+            return float(0.5 * (moved @ self._resisting))
         return float(0.5 * (moved @ (self.form @ moved)))
 
     def objective(self, x: Vector) -> float:
@@ -114,7 +120,7 @@ class CentralPath:
 
     def imbalance(self, counted: NDArray[np.bool_]) -> Vector:
         """Return pull - H (x - o) + forces, (n,), those of the bounds and of some rows (q,)."""
-        rest = self.pull - self.form @ (self.x - self.origin)
+        rest = self.pull - self._resisting
         rest[self.at_lower] += self.force[0]
         rest[self.at_upper] -= self.force[1]
         some = np.flatnonzero(counted)
@@ -175,7 +181,7 @@ class CentralPath:
         moves, changes = self._follow(attempt, [np.zeros(len(slack)) for slack in self.slack])
         _, changes = self._follow(step, self._target(moves, changes))
         dual = self._dual_length(changes)
-        self.x = self.x + length * step
+        self._go_to(self.x + length * step)
         self._others.moved(length, step)
         self.lack = (1.0 - length) * self.lack
         self.slack = self._slacks()
@@ -214,7 +220,7 @@ class CentralPath:
     def _right(self, target: Kinds) -> Vector:
         """Return the right-hand side of the step that brings slack times force to a target."""
         push = [one / slack for one, slack in zip(target, self.slack, strict=True)]
-        right = self.pull - self.form @ (self.x - self.origin)
+        right = self.pull - self._resisting
         right[self.at_lower] += push[0]
         right[self.at_upper] -= push[1]
         return np.asarray(right + self.rows.T @ (push[2] + self.force[2] / self.slack[2] * self.lack))

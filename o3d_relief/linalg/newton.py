@@ -68,24 +68,22 @@ class Within:
     """
 
     def __init__(self, form: sp.csr_array, maps: sp.csr_array) -> None:
-        self._form = form
-        self._take(maps)
-        self._ordered, self._entries = False, 0
-
-    def _take(self, maps: sp.csr_array) -> None:
         self._maps, self._back = maps, maps.T.tocsr()
-        self._inside = self._back @ (self._form @ maps)
+        self._form = self._back @ (form @ maps)
+        self._ordered, self._entries = False, 0
 
     def prepare(self, diagonal: NDArray[np.float64], rows: sp.csr_array, stiff: NDArray[np.float64]) -> Solve:
         """See `Everywhere`; x is in the space, and only what the space has of b counts."""
         maps, back = self._maps, self._back
         inside = rows @ maps
         springs = inside.T @ (sp.diags_array(stiff) @ inside)
-        matrix = (self._inside + back @ (sp.diags_array(diagonal) @ maps) + springs).tocsr()
+        matrix = (self._form + back @ (sp.diags_array(diagonal) @ maps) + springs).tocsr()
         factor = Factor(matrix, None, ordered=self._ordered)
         if not self._ordered:
             # The next matrices are nearly the same: their unknowns come in this order.
-            self._take(maps[:, factor.elimination()])
+            order = factor.elimination()
+            self._maps, self._back = maps[:, order], back[order]
+            self._form = self._form[order][:, order]
             self._ordered, self._entries = True, factor.entries
         elif factor.entries > _FILL * self._entries:
             self._ordered = False
