@@ -136,8 +136,9 @@ def closest_relief(
     lower = np.where(visible & (held == 0.0), 0.0, -np.inf)
     # Linear scaling must keep a little of its room: that is as far as a smallest gap can be asked for here.
     kept = np.clip(np.minimum(pairs.gap, min_gap), _KEPT_GAP * ratio * pairs.gap, 0.7 * ratio * pairs.gap)
-    place = _Place(gap_rows(pairs, n), seen, visible, attach, depth)
-    between = BetweenLines(vertices, faces)
+    gaps = gap_rows(pairs, n)
+    place = _Place(gaps, seen, visible, attach, depth)
+    between = BetweenLines(vertices, faces, gaps)
     added = [0]
 
     def missed(x: NDArray[np.float64]) -> tuple[sp.csr_array, NDArray[np.float64]]:
@@ -154,7 +155,7 @@ def closest_relief(
         start=inside,
         lower=lower,
         upper=np.full(n, depth),
-        rows=sp.vstack([gap_rows(pairs, n), seen]).tocsr(),
+        rows=sp.vstack([gaps, seen]).tocsr(),
         bound=np.concatenate([kept, np.zeros(seen.shape[0])]),
         more_rows=missed,
         positions=vertices,

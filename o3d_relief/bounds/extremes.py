@@ -44,6 +44,8 @@ def extreme_pairs(pairs: Pairs, plane: NDArray[np.float64], *, side: int = 1024)
     >>> extreme_pairs(row, plane, side=5).gap.tolist()
     [0.1, 0.9]
     """
+    crowded = _crowded(pairs)
+    alone, pairs = pairs.select(~crowded), pairs.select(crowded)
     low, extent = plane.min(axis=0), np.ptp(plane, axis=0)
     place = np.einsum("pck,pc->pk", plane[pairs.upper], pairs.upper_weights)
     line = np.rint((place - low) / np.where(extent > 0.0, extent, 1.0) * side - 0.5).astype(np.int64)
@@ -57,7 +59,22 @@ def extreme_pairs(pairs: Pairs, plane: NDArray[np.float64], *, side: int = 1024)
         between = np.zeros(len(kept), dtype=bool)
         between[1:-1] = same[:-1] & same[1:]
         kept = np.sort(kept[order[~between]])
-    return pairs.select(kept)
+    return Pairs.join([alone, pairs.select(kept)])
+
+
+def _crowded(pairs: Pairs) -> NDArray[np.bool_]:
+    """Tell which pairs may share their triangles with two others, (p,): others lie between none."""
+    corners = np.concatenate([pairs.upper, pairs.lower], axis=1).astype(np.uint64)
+    factors = np.random.default_rng(0).integers(1, 2**63, 6, dtype=np.uint64)
+    key = np.zeros(len(pairs), dtype=np.uint64)  # numbers that may be the same by chance
+    for corner, factor in zip(corners.T, factors, strict=True):
+        key += corner * factor
+    order = np.argsort(key, kind="stable")
+    ordered = key[order]
+    first = np.searchsorted(ordered, ordered, side="left")
+    crowded = np.zeros(len(pairs), dtype=bool)
+    crowded[order] = np.bincount(first, minlength=len(pairs))[first] > 2
+    return crowded
 
 
 def _groups(pairs: Pairs, n: int) -> NDArray[np.int64]:

@@ -11,6 +11,7 @@ from o3d_relief.bounds.grid import grid_pairs
 from o3d_relief.bounds.lines import Lines, upright
 from o3d_relief.bounds.origin import Origin
 from o3d_relief.bounds.pairs import Pairs, foot_pairs, vertex_pairs
+from o3d_relief.bounds.raster import Raster
 from o3d_relief.bounds.rows import gap_rows
 from o3d_relief.stages.trim import trim_behind
 
@@ -26,8 +27,11 @@ _ASIDE = ((0.0, 0.0), (1e-5, 0.0), (-1e-5, 0.0), (0.0, 1e-5), (0.0, -1e-5))
 """How far beside vertices is looked, too, in relief units: of a vertex on the outline of a surface it is
 chance in float32 on which side it comes to lie, and for the certificate that may be another one."""
 
-_MANY = 200
-"""Where so many pairs cross, nothing else is looked for: most of it goes away with them."""
+_CLOSE = 0.05
+"""Gap in relief units below which surfaces are close: most of what is missed is near such places."""
+
+_FEW = 0.5
+"""Share of the faces up to which a look at those near such places comes first."""
 
 
 class BetweenLines:
@@ -38,11 +42,19 @@ class BetweenLines:
     vertices : (n, 3) float64
         Original positions.
     faces : (m, 3) int64
+    gaps : (q, n) sparse float64, optional
+        Rows that give the gaps of the pairs on these lines. Where they are small is looked first.
     """
 
-    def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
+    def __init__(
+        self,
+        vertices: NDArray[np.float64],
+        faces: NDArray[np.int64],
+        gaps: sp.csr_array | None = None,
+    ) -> None:
         self._vertices, self._faces = vertices, faces
         self._edges = edges_of(faces)
+        self._gaps, self._raster = gaps, Raster(vertices, faces)
 
     def missed(self, z: NDArray[np.float64]) -> tuple[sp.csr_array, NDArray[np.float64]]:
         """Find what crosses or has changed places where it did not before.
@@ -60,10 +72,31 @@ class BetweenLines:
         gap : (p,) float64
             That of before. What lies behind S does not count.
         """
-        found = self._before_the_cut(z)
+        found = self._close_by(z)
+        if len(found) == 0:
+            found = self._before_the_cut(z)
         if len(found):
             return gap_rows(found, len(z)), found.gap
         return self._after_the_cut(z)
+
+    def _close_by(self, z: NDArray[np.float64]) -> Pairs:
+        """Look where surfaces are close only: as long as much is missed, most of it is there."""
+        close = np.zeros(len(z), dtype=bool)
+        if self._gaps is not None:
+            close[self._gaps[np.flatnonzero(self._gaps @ z < _CLOSE)].indices] = True
+        faces = self._faces.compress(self._over_or_under(close), axis=0)
+        if not 0 < len(faces) <= _FEW * len(self._faces):
+            return Pairs.join([])
+        close[:] = False
+        close[faces] = True
+        number, place = np.flatnonzero(close), np.cumsum(close) - 1
+        part = BetweenLines(self._vertices[number], place[faces])
+        return part._before_the_cut(z[number]).renumbered(number)
+
+    def _over_or_under(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Find the faces that may lie above or below some with a chosen vertex, (m,)."""
+        a, b, c = self._faces.T
+        return self._raster.over_or_under(chosen[a] | chosen[b] | chosen[c])
 
     def _before_the_cut(self, z: NDArray[np.float64]) -> Pairs:
         before = self._vertices[:, 2]
@@ -76,10 +109,16 @@ class BetweenLines:
         new |= apart & met.pierced(z, deep=_SHALLOW) & ~met.pierced(before, deep=_SHALLOW / 2.0)
         new &= _in_front(met, before, z)
         crossing = met.select(new).pairs(before, z)
-        if len(crossing) > _MANY:
-            return crossing
+        # However many cross: what has turned far is hard to mend once the relief is close to the others.
         turned = _turned(vertex_pairs(Lines(relief, self._faces)), before)
-        found = Pairs.join([turned, foot_pairs(self._vertices, self._faces, self._edges, z)])
+        through = self._edges.compress(z[self._edges[:, 0]] * z[self._edges[:, 1]] < 0.0, axis=0)
+        at_foot = np.zeros(len(z), dtype=bool)
+        at_foot[through] = True
+        # What lies over the feet, and what is next to that: the borders of what is left out are elsewhere.
+        for _ in range(2):
+            faces = self._faces.compress(self._over_or_under(at_foot), axis=0)
+            at_foot[faces] = True
+        found = Pairs.join([turned, foot_pairs(self._vertices, faces, through, z)])
         return Pairs.join([crossing, found.select(np.maximum(*found.heights(z)) > 0.0)])
 
     def _after_the_cut(self, z: NDArray[np.float64]) -> tuple[sp.csr_array, NDArray[np.float64]]:

@@ -7,7 +7,7 @@ displacement.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -59,6 +59,10 @@ class Pairs:
             lower_weights=self.lower_weights.take(number, axis=0),
             gap=self.gap.take(number),
         )
+
+    def renumbered(self, number: NDArray[np.int64]) -> Pairs:
+        """Return the pairs of a part of a mesh with the numbers of the whole: those of its vertices, (n,)."""
+        return replace(self, upper=number[self.upper], lower=number[self.lower])
 
     def difference(self, n: int) -> sp.csr_array:
         """Return the matrix R, (p, n), with which R z is the height of the upper less that of the lower."""

@@ -12,7 +12,7 @@ from o3d_relief.linalg.cholesky import Cholesky
 from o3d_relief.linalg.dissection import nested_dissection
 from o3d_relief.linalg.one_thread import one_thread
 
-__all__ = ["Factor"]
+__all__ = ["Factor", "superlu"]
 
 _BADLY_CUT = 50.0
 """Squares of the sizes of all separators, for each unknown, from which planes cut too much: some 20 on
@@ -50,7 +50,7 @@ class Factor:
                 self._factor: Cholesky | sla.SuperLU = Cholesky(matrix, dissection)
             else:
                 # Minimum degree is better where planes cut much, and slow on large fine surfaces.
-                self._factor = _by_minimum_degree(matrix)
+                self._factor = superlu(matrix)
         self.order.flags.writeable = False
 
     def solve(self, right_hand_side: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -72,12 +72,31 @@ class Factor:
             return np.asarray(self._factor.solve(right_hand_sides), dtype=np.float64)
 
 
-def _by_minimum_degree(matrix: sp.csr_array) -> sla.SuperLU:
-    """Factorise a matrix of any graph."""
+def superlu(matrix: sp.csr_array, *, ordered: bool = False) -> sla.SuperLU:
+    """Factorise a symmetric positive definite matrix of any graph.
+
+    Parameters
+    ----------
+    matrix : (n, n) sparse float64
+    ordered : bool
+        Take the unknowns in the order in which they are, not by minimum degree.
+
+    Returns
+    -------
+    scipy.sparse.linalg.SuperLU
+        Its `perm_c` tells the place of each unknown in the order of elimination.
+
+    Raises
+    ------
+    SolverError
+        The matrix is singular.
+    """
     try:
         return sla.splu(
             matrix.tocsc(),
-            permc_spec="MMD_AT_PLUS_A",
+            permc_spec="NATURAL" if ordered else "MMD_AT_PLUS_A",
+            # Small panels are faster where the unknowns have few neighbours, as in spaces of patches.
+            **({"panel_size": 4, "relax": 1} if ordered else {}),
             diag_pivot_thresh=0.0,
             options={"SymmetricMode": True},
         )

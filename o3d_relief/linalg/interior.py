@@ -128,7 +128,7 @@ def minimise(
             refining = Refining(path, Patches(form, positions, _FIRST_PATCHES))
         accepted, least = _run(path, refining, accuracy, more_rows, tick)
     share = (path.objective(accepted) - least) / max(path.energy(accepted), 1e-300)
-    return Minimum(x=accepted, rounds=path.rounds, watched=int(path.watched.sum()), gap=share)
+    return Minimum(x=accepted, rounds=path.rounds, watched=len(path.lack), gap=share)
 
 
 def _run(

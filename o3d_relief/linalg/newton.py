@@ -8,9 +8,12 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from o3d_relief.linalg.factor import Factor
+from o3d_relief.linalg.factor import Factor, superlu
 
 __all__ = ["Everywhere", "Solve", "Within"]
+
+_FILL = 1.2
+"""Growth of a factor, by rows that have come, from which on its unknowns are ordered anew."""
 
 Solve = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
@@ -67,11 +70,21 @@ class Within:
     def __init__(self, form: sp.csr_array, maps: sp.csr_array) -> None:
         self._maps, self._back = maps, maps.T.tocsr()
         self._form = self._back @ (form @ maps)
+        self._ordered, self._entries = False, 0
 
     def prepare(self, diagonal: NDArray[np.float64], rows: sp.csr_array, stiff: NDArray[np.float64]) -> Solve:
         """See `Everywhere`; x is in the space, and only what the space has of b counts."""
         maps, back = self._maps, self._back
         inside = rows @ maps
         springs = inside.T @ (sp.diags_array(stiff) @ inside)
-        factor = Factor((self._form + back @ (sp.diags_array(diagonal) @ maps) + springs).tocsr(), None)
+        matrix = (self._form + back @ (sp.diags_array(diagonal) @ maps) + springs).tocsr()
+        factor = superlu(matrix, ordered=self._ordered)
+        if not self._ordered:
+            # The next matrices are nearly the same: their unknowns come in this order.
+            order = np.argsort(factor.perm_c)
+            self._maps, self._back = maps[:, order], back[order]
+            self._form = self._form[order][:, order]
+            self._ordered, self._entries = True, factor.nnz
+        elif factor.nnz > _FILL * self._entries:
+            self._ordered = False
         return lambda right: np.asarray(maps @ factor.solve(back @ right))

@@ -73,7 +73,7 @@ class Refining:
             return False
         path = self._path
         # Rows that have just come are held by forces that are none of the minimum's.
-        rest, energy = path.imbalance(path.watched & ~path.lacking), path.energy(path.x)
+        rest, energy = path.imbalance(~path.lacking), path.energy(path.x)
         local = self._more * self._local(rest)
         missing = float(local.sum()) / energy
         allowed = max(_MISSING * accuracy, _MISSING_BEFORE * share)
@@ -84,7 +84,7 @@ class Refining:
 
     def cost(self) -> float:
         """Return by how much the space lowers the dual bound on the objective."""
-        rest = self._path.imbalance(self._path.watched)
+        rest = self._path.imbalance(np.ones(len(self._path.lack), dtype=bool))
         moved, _ = sla.cg(self._form, rest, rtol=_ROUGH, atol=0.0, maxiter=_MOST_STEPS, M=self._cycle)
         cost, local = 0.5 * float(rest @ moved), float(self._local(rest).sum())
         if local > 0.0 and not self._path.lacking.any():

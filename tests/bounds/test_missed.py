@@ -2,7 +2,10 @@ import numpy as np
 import pytest
 
 from o3d_relief.bounds import missed
+from o3d_relief.bounds.lines import Lines
 from o3d_relief.bounds.missed import BetweenLines
+from o3d_relief.bounds.pairs import vertex_pairs
+from o3d_relief.bounds.rows import gap_rows
 from shapes import bust, grid, joined, moved
 
 
@@ -83,3 +86,21 @@ def test_vertices_just_beside_an_outline_are_looked_at(monkeypatch):
     rows, gap = between.missed(z)
     assert gap == pytest.approx(10.0, abs=0.01)
     assert rows @ z == pytest.approx(-15.0, abs=0.01)
+
+
+def test_what_is_close_is_looked_at_first_and_found_the_same():
+    # Two sheets far apart, of many faces, and beside them two that come to cross.
+    low, high = moved(grid(24), (200.0, 0.0, 0.0)), moved(grid(24), (200.0, 0.0, 10.0))
+    vertices, faces = joined(grid(6), moved(grid(4, size=40.0), (3.0, 5.0, 10.0)), low, high)
+    pairs = vertex_pairs(Lines(vertices, faces))
+    beside = vertices[:, 0] < 150.0
+    z = np.where(beside & (vertices[:, 2] > 5.0), 5.0 - 0.5 * vertices[:, 0], vertices[:, 2] + 5.0)
+    between = BetweenLines(vertices, faces, gap_rows(pairs, len(vertices)))
+    rows, gap = between.missed(z)
+    assert (vertices[rows.indices, 0] < 150.0).all()
+    plainly, same = BetweenLines(vertices, faces).missed(z)
+    assert len(gap) > 0
+    assert np.sort(rows @ z) == pytest.approx(np.sort(plainly @ z), abs=1e-4)
+    assert np.sort(gap) == pytest.approx(np.sort(same), abs=1e-4)
+    assert len(between._close_by(z)) == len(gap)
+    assert len(between._close_by(vertices[:, 2])) == 0

@@ -47,3 +47,14 @@ def test_what_is_too_close_for_the_next_surface(gap, there):
     assert (len(pairs) >= 25) == there  # every vertex of the smaller plate
     assert pairs.gap == pytest.approx(gap, abs=2e-5)
     assert (len(vertex_pairs(Lines(vertices, faces))) > 0) == (gap > 1e-3)
+
+
+def test_pairs_of_a_part_get_the_numbers_of_the_whole():
+    vertices, faces = joined(grid(3), moved(grid(3), (1.0, 1.0, 5.0)))
+    pairs = vertex_pairs(Lines(vertices, faces))
+    number = 10 + 2 * np.arange(len(vertices))
+    whole = np.zeros(10 + 2 * len(vertices))
+    whole[number] = vertices[:, 2]
+    renumbered = pairs.renumbered(number)
+    assert len(pairs) > 0
+    assert np.subtract(*renumbered.heights(whole)) == pytest.approx(pairs.gap)

@@ -57,4 +57,4 @@ def test_rows_that_are_known_are_not_added_again():
     row = sp.csr_array(np.array([[-1.0, 0.0]]))
     path.add(row, np.array([-1.0]))
     path.add(row, np.array([-1.0]))
-    assert len(path.watched) == 1
+    assert path.rows.shape[0] == 1

@@ -37,3 +37,26 @@ def test_singular_systems_are_refused():
     form, _, rows, _, b = system()
     with pytest.raises(SolverError, match="144 unknowns"):
         Everywhere(sp.csr_array(0.0 * form), None).prepare(np.zeros(len(b)), rows[:0], np.zeros(0))
+
+
+def test_a_space_gives_the_same_in_whatever_order_its_unknowns_come():
+    form, diagonal, rows, stiff, b = system()
+    maps = sp.csr_array(np.random.default_rng(1).normal(size=(len(b), 7)))
+    within = Within(form, maps)
+    first = within.prepare(diagonal, rows, stiff)
+    x = first(b)
+    # The second system is set up with the unknowns in the order of the first one's factor.
+    assert within.prepare(diagonal, rows, stiff)(b) == pytest.approx(x, abs=1e-9)
+    assert first(b) == pytest.approx(x, abs=1e-12)
+
+
+def test_unknowns_are_ordered_anew_when_rows_have_filled_the_factor():
+    form, diagonal, _, _, b = system(24)
+    n = len(b)
+    within = Within(form, sp.csr_array(sp.eye_array(n)))
+    far = np.random.default_rng(2).permutation(n)[:120]
+    rows = sp.coo_array((np.ones(120), (np.repeat(np.arange(60), 2), far)), shape=(60, n)).tocsr()
+    for some in (rows[:0], rows, rows):
+        stiff = np.full(some.shape[0], 10.0)
+        x = within.prepare(diagonal, some, stiff)(b)
+        assert form @ x + diagonal * x + some.T @ (stiff * (some @ x)) == pytest.approx(b, abs=1e-9)
