@@ -20,6 +20,7 @@ from o3d_relief.live_construction import LiveConstruction
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.point_edits import PointEdit
 from o3d_relief.progress import NOBODY, Progress
+from o3d_relief.rays import UnitBox
 from o3d_relief.records import AttenuationStage
 from o3d_relief.scene.convert import mesh_arrays
 from o3d_relief.stages.attenuation import attenuate
@@ -78,7 +79,9 @@ class LiveScene:
         if self.parts == 1:
             return None
         faces = self.scene.faces
-        return find_springs(self.vertices, faces, self.laplacian, vertex_pairs(Lines(self.vertices, faces)))
+        # The same rays as in the pipeline: what they meet may hang on the last digit of float32.
+        lines = Lines(self.vertices, faces, UnitBox(self.vertices, faces))
+        return find_springs(self.vertices, faces, self.laplacian, vertex_pairs(lines))
 
     def scaled(self, params: ReliefParams) -> NDArray[np.float64]:
         """Scale the scene linearly to the depth of the bounded mode, what is visible in front of S.
