@@ -12,6 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from o3d_relief.bounds.parts import PartSprings
 from o3d_relief.linalg.factor import Factor
 from o3d_relief.linalg.responses import Responses
+from o3d_relief.memory import memory_kept
 from o3d_relief.progress import NOBODY, Progress
 from o3d_relief.stages.construction import leaders
 
@@ -202,6 +203,7 @@ class LiveConstruction:
         factor = Factor(rows[:, index].tocsr(), self._vertices[index])
         return _Loose(index=index, factor=factor, rows=rows, pull=pull)
 
+    @memory_kept()
     def _responses(
         self, form: sp.csr_array, points: NDArray[np.int64], *, keep_factor: bool = False
     ) -> Responses:

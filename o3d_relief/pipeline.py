@@ -16,6 +16,7 @@ from o3d_relief.bounds.near_points import NearPoints
 from o3d_relief.errors import MeshError, ParameterError
 from o3d_relief.journal import Journal, OnStage
 from o3d_relief.linalg.laplacian import cotangent_laplacian
+from o3d_relief.memory import memory_kept
 from o3d_relief.order_step import order_step
 from o3d_relief.output import trimmed_mesh
 from o3d_relief.params import ReliefParams, View
@@ -43,6 +44,7 @@ from o3d_relief.steps import (
 __all__ = ["make_relief"]
 
 
+@memory_kept()
 def make_relief(
     mesh: o3d.geometry.TriangleMesh | o3d.geometry.PointCloud | Scan,
     params: ReliefParams | None = None,

@@ -58,7 +58,8 @@ class Multigrid:
         self._levels: list[_Level] = []
         current = sorted_matrix(matrix)
         while current.shape[0] > _COARSEST:
-            interpolation = smoothed(current, aggregates(current))
+            filtered = _pulling(current)
+            interpolation = smoothed(filtered, _gathered(filtered))
             if interpolation.shape[1] > _LEAST_COARSENING * current.shape[0]:
                 break
             restriction = interpolation.T.tocsr()
@@ -84,10 +85,11 @@ class Multigrid:
         first = _substitute(level.lower, right_hand_side, backwards=False)
         # A x = (L + D) x + (D + U) x - D x, and (L + D) x is the right-hand side.
         scaled = level.diagonal * first
-        rest = scaled - level.upper @ first
+        rest = level.upper @ first
+        np.subtract(scaled, rest, out=rest)
         correction = level.interpolation @ self._cycle(depth + 1, level.restriction @ rest)
         # The backward sweep from x + e: (D + U) x' = b - L x - L e, and b - L x is D x.
-        scaled += level.diagonal * correction
+        scaled += np.multiply(level.diagonal, correction, out=rest)
         scaled -= level.lower @ correction
         return _substitute(level.upper, scaled, backwards=True)
 
@@ -155,12 +157,33 @@ def _triangle(matrix: sp.csr_matrix, *, upper: bool) -> sp.csr_matrix:
     return _select(matrix, matrix.indices >= rows if upper else matrix.indices <= rows)
 
 
+def _pulling(matrix: sp.csr_matrix) -> sp.csr_matrix:
+    """Return a matrix with its strong negative couplings only; the others are added to the diagonal.
+
+    Across obtuse angles couplings are positive: they push unknowns apart. An aggregate across them, or an
+    interpolation, takes for smooth what is rough.
+    """
+    rows = _rows(matrix)
+    root = np.sqrt(np.abs(matrix.diagonal()))
+    itself = matrix.indices == rows
+    kept = (-matrix.data >= _STRONG * root[rows] * root[matrix.indices]) | itself
+    lost = np.bincount(rows, weights=np.where(kept, 0.0, matrix.data), minlength=matrix.shape[0])
+    found = _select(matrix, kept)
+    found.data[itself[kept]] += lost[rows[itself]]
+    return found
+
+
 def aggregates(matrix: sp.csr_matrix) -> sp.csr_matrix:
-    """Gather strongly connected unknowns: (n, a) float64, with at most one 1 in each row."""
+    """Gather strongly coupled unknowns: (n, a) float64, with at most one 1 in each row."""
     root = np.sqrt(np.abs(matrix.diagonal()))
     rows = _rows(matrix)
     strong = np.abs(matrix.data) >= _STRONG * root[rows] * root[matrix.indices]
-    found = standard_aggregation(_select(matrix, strong | (matrix.indices == rows)))[0]
+    return _gathered(_select(matrix, strong | (matrix.indices == rows)))
+
+
+def _gathered(matrix: sp.csr_matrix) -> sp.csr_matrix:
+    """Gather unknowns by the graph of a matrix: (n, a) float64, with at most one 1 in each row."""
+    found = standard_aggregation(matrix)[0]
     return sp.csr_matrix((np.ones(found.nnz), found.indices, found.indptr), shape=found.shape)
 
 

@@ -179,14 +179,19 @@ def conjugate_gradients(
         tick(None)
         steepest = precondition(residual)
         now = float(residual @ steepest)
-        direction = steepest if not gains else steepest + (now / last) * direction
+        if gains:
+            direction *= now / last
+            direction += steepest
+        else:
+            direction = steepest
         along = matrix @ direction
         curvature = float(direction @ along)
         if not (curvature > 0.0 and now > 0.0):
             break
         step, last = now / curvature, now
-        solution += step * direction
-        residual -= step * along
+        along *= step
+        residual -= along
+        solution += np.multiply(direction, step, out=along)
         gains.append(step * now)
         if np.linalg.norm(residual) <= small or _energy_left(gains) <= error**2:
             break

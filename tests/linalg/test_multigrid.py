@@ -5,7 +5,8 @@ from threadpoolctl import threadpool_limits
 
 from o3d_relief import cotangent_laplacian
 from o3d_relief.linalg.multigrid import Multigrid, multigrid
-from shapes import hills
+from o3d_relief.linalg.solve import solve_spd
+from shapes import grid, hills
 
 
 def _matrix(side):
@@ -25,6 +26,20 @@ def test_one_cycle_is_symmetric_and_close_to_the_inverse():
     # The eigenvalues of M A lie in (0, 1]: the error shrinks in every cycle.
     shares = np.linalg.eigvals(inverse @ matrix.toarray()).real
     assert 0.1 < shares.min() <= shares.max() < 1.0 + 1e-9
+
+
+@pytest.mark.parametrize(("shear", "most"), [(0.0, 18), (1.5, 28), (3.0, 50)])
+def test_obtuse_triangles_cost_few_steps_more(shear, most):
+    vertices, faces = grid(121)
+    vertices = vertices.copy()
+    vertices[:, 0] += shear * vertices[:, 1]
+    laplacian, _ = cotangent_laplacian(vertices, faces)
+    matrix = laplacian[1:][:, 1:].tocsr()
+    steps = []
+    solve_spd(
+        matrix, np.random.default_rng(0).normal(size=matrix.shape[0]), tolerance=1e-10, tick=steps.append
+    )
+    assert len(steps) <= most  # 15, 39 and 95 where couplings across obtuse angles count as strong
 
 
 def test_coarsest_level_is_exact():
