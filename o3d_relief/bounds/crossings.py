@@ -210,8 +210,11 @@ def crossings(vertices: NDArray[np.float64], faces: NDArray[np.int64], edges: ND
 
 def _rays(places: NDArray[np.float64], edges: NDArray[np.int64]) -> NDArray[np.float32]:
     """Return rays along edges, from 0 to 1."""
-    start, end = places.take(edges[:, 0], axis=0), places.take(edges[:, 1], axis=0)
-    return np.concatenate([start, end - start], axis=1, dtype=np.float32)
+    start, end = (places.take(tips, axis=0) for tips in np.ascontiguousarray(edges.T))
+    rays = np.zeros((len(edges), 6), dtype=np.float32)
+    rays[:, :3] = start
+    rays[:, 3:] = end - start
+    return rays
 
 
 def _meets(scene: o3d.t.geometry.RaycastingScene, rays: NDArray[np.float32]) -> NDArray[np.bool_]:
