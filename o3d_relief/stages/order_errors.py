@@ -261,4 +261,4 @@ def _next_to(places: NDArray[np.float64], centres: NDArray[np.float64], reach: f
     row, column = (
         ((line[near] - start) / size).astype(np.int32) + 1 for line, start in ((x, left), (y, bottom))
     )
-    return near[marked[row, column]]
+    return np.asarray(near[marked[row, column]])
