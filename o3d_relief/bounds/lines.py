@@ -9,15 +9,12 @@ import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
-from o3d_relief.rays import UnitBox
+from o3d_relief.rays import FROM, UP, UnitBox
 
 __all__ = ["FROM", "MISS", "SAME_PLACE", "UP", "Borders", "Hits", "Lines", "upright", "weights_of"]
 
 SAME_PLACE = 5e-4
 """Points of a line that are closer than this, in relief units, are one: rays are cast in float32."""
-
-FROM = 0.1 * SAME_PLACE
-"""Where rays begin above or below a vertex: right at it they meet its own triangles."""
 
 _UPRIGHT = 0.01
 """Share of its area at which a triangle, seen from the front, counts as upright: there an error of float32 in
@@ -28,8 +25,6 @@ _BLOCK = 16384
 
 MISS = 0xFFFFFFFF
 """What RaycastingScene calls the triangle that a ray does not meet."""
-
-UP = np.array([0.0, 0.0, 1.0])
 
 
 def upright(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -236,7 +231,7 @@ class Lines:
     @cached_property
     def above(self) -> Hits:
         """What is met first above the vertices."""
-        return self.first(self.vertices + FROM * UP, UP)
+        return self._nearest(self._box.above, self.vertices + FROM * UP, UP)
 
     @cached_property
     def below(self) -> Hits:
@@ -245,7 +240,17 @@ class Lines:
 
     def first(self, origins: NDArray[np.float64], direction: NDArray[np.float64]) -> Hits:
         """Return what is met first from origins (q, 3) on, in one direction along z."""
-        found = self._hits(self._box.scene.cast_rays(self._box.rays(origins, direction)))
+        answer = self._box.scene.cast_rays(self._box.rays(origins, direction))
+        return self._nearest(answer, origins, direction)
+
+    def _nearest(
+        self,
+        answer: dict[str, o3d.core.Tensor],
+        origins: NDArray[np.float64],
+        direction: NDArray[np.float64],
+    ) -> Hits:
+        """Return the nearest hits of faces that do not stand upright, by what rays met first of all."""
+        found = self._hits(answer)
         standing = found.triangle < 0
         if not standing.any():
             return found
