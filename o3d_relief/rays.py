@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
-__all__ = ["UnitBox", "unit_box"]
+__all__ = ["FROM", "UP", "UnitBox", "unit_box"]
+
+FROM = 5e-5
+"""Where rays begin above or below a vertex, in relief units: right at it they meet its own triangles."""
+
+UP = np.array([0.0, 0.0, 1.0])
 
 
 def unit_box(
@@ -49,10 +56,19 @@ class UnitBox:
     ----------
     scene, middle, size
         See `unit_box`.
+    above
+        Found when it is first asked for.
     """
 
     def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
         self.scene, self.middle, self.size = unit_box(vertices, faces)
+        self._vertices = vertices
+
+    @cached_property
+    def above(self) -> dict[str, o3d.core.Tensor]:
+        """What rays upwards from `FROM` above the vertices meet first, as the scene answers."""
+        answer: dict[str, o3d.core.Tensor] = self.scene.cast_rays(self.rays(self._vertices + FROM * UP, UP))
+        return answer
 
     def rays(self, origins: NDArray[np.float64], direction: NDArray[np.float64]) -> o3d.core.Tensor:
         """Return rays from origins (q, 3), of the mesh's frame, in one direction (3,)."""

@@ -35,6 +35,9 @@ _CLOSE = 0.02
 _INSIDE = 1e-4
 """Share at both ends of an edge that does not count as crossing: there it meets its neighbours."""
 
+_BLOCK = 16384
+"""Edges that are worked on at once."""
+
 _OVER = 3e-5
 """How far over its edge a ray passes, in relief units: it does not meet the triangles of the edge, and of
 the crossings that count it misses none."""
@@ -210,8 +213,13 @@ def crossings(vertices: NDArray[np.float64], faces: NDArray[np.int64], edges: ND
 
 def _rays(places: NDArray[np.float64], edges: NDArray[np.int64]) -> NDArray[np.float32]:
     """Return rays along edges, from 0 to 1."""
-    start, end = places.take(edges[:, 0], axis=0), places.take(edges[:, 1], axis=0)
-    return np.concatenate([start, end - start], axis=1, dtype=np.float32)
+    rays = np.zeros((len(edges), 6), dtype=np.float32)
+    for begin in range(0, len(edges), _BLOCK):
+        part = slice(begin, begin + _BLOCK)
+        start, end = (places.take(edges[part, tip], axis=0) for tip in (0, 1))
+        rays[part, :3] = start
+        rays[part, 3:] = end - start
+    return rays
 
 
 def _meets(scene: o3d.t.geometry.RaycastingScene, rays: NDArray[np.float32]) -> NDArray[np.bool_]:

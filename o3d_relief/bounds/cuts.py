@@ -46,8 +46,8 @@ def cut_crossings(
     """
     # Two corners in front of S, one behind.
     side = np.where(z > 0.0, 1, np.where(z < 0.0, -5, 0)).astype(np.int8)
-    one, two, three = np.ascontiguousarray(faces.T)
-    cut = np.flatnonzero(side[one] + side[two] + side[three] == -3)
+    one, two, three = side[faces].T
+    cut = np.flatnonzero(one + two + three == -3)
     cut = cut[_narrow(vertices[:, :2], faces[cut])]
     if len(cut) == 0:
         return Pairs.join([]), 0

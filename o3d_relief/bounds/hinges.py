@@ -49,7 +49,7 @@ def hinged_pairs(
     1
     """
     front = z > 0.0
-    one, two, three = (front[corner] for corner in np.ascontiguousarray(faces.T))
+    one, two, three = front[faces].T
     cut = faces[(one != two) | (two != three)]
     beside = np.zeros(len(z), dtype=bool)
     beside[cut] = True

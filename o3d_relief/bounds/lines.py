@@ -9,15 +9,10 @@ import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
-from o3d_relief.rays import UnitBox
+from o3d_relief.bounds.borders import SAME_PLACE, Borders
+from o3d_relief.rays import FROM, UP, UnitBox
 
 __all__ = ["FROM", "MISS", "SAME_PLACE", "UP", "Borders", "Hits", "Lines", "upright", "weights_of"]
-
-SAME_PLACE = 5e-4
-"""Points of a line that are closer than this, in relief units, are one: rays are cast in float32."""
-
-FROM = 0.1 * SAME_PLACE
-"""Where rays begin above or below a vertex: right at it they meet its own triangles."""
 
 _UPRIGHT = 0.01
 """Share of its area at which a triangle, seen from the front, counts as upright: there an error of float32 in
@@ -28,8 +23,6 @@ _BLOCK = 16384
 
 MISS = 0xFFFFFFFF
 """What RaycastingScene calls the triangle that a ray does not meet."""
-
-UP = np.array([0.0, 0.0, 1.0])
 
 
 def upright(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -53,48 +46,6 @@ def upright(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[
         x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
         standing[begin : begin + _BLOCK] = np.abs(z) <= _UPRIGHT * np.sqrt(x**2 + y**2 + z**2)
     return standing
-
-
-class Borders:
-    """The borders of a mesh, seen from the front: a line that grazes one meets the surface by chance."""
-
-    def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
-        n = len(vertices)
-        corners = np.ascontiguousarray(faces.T)
-        start, end = corners[[1, 2, 0]], corners[[2, 0, 1]]
-        edge = np.minimum(start, end) * n + np.maximum(start, end)
-        ordered = np.sort(edge, axis=None)
-        alone = np.ones(len(ordered), dtype=bool)
-        same = ordered[1:] == ordered[:-1]
-        alone[1:] &= ~same
-        alone[:-1] &= ~same
-        single = ordered[alone]
-        at_border = np.zeros(n, dtype=bool)
-        at_border[single // n] = True
-        at_border[single % n] = True
-        self._on_border = at_border[start] & at_border[end]
-        likely = edge[self._on_border]
-        place = np.minimum(np.searchsorted(single, likely), max(len(single) - 1, 0))
-        self._on_border[self._on_border] = single[place] == likely
-        self._corner_on_border = at_border[corners]
-        x, y = np.ascontiguousarray(vertices[:, :2].T)
-        across, along = x[end] - x[start], y[end] - y[start]
-        area = np.abs(across[0] * along[1] - along[0] * across[1])
-        opposite = np.sqrt(across**2 + along**2)
-        self._height = area / np.maximum(opposite, np.finfo(np.float64).tiny)
-
-    def grazed(self, triangle: NDArray[np.int64], weights: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Tell which points of triangles, (q,) and (q, 3), lie on a border, to a rounding error."""
-        near = [
-            own * height[triangle] < 2 * SAME_PLACE
-            for own, height in zip(weights.T, self._height, strict=True)
-        ]
-        grazed = np.zeros(len(triangle), dtype=bool)
-        for side in range(3):
-            at_corner = near[side - 2] & near[side - 1]
-            grazed |= near[side] & self._on_border[side][triangle]
-            grazed |= at_corner & self._corner_on_border[side][triangle]
-        return grazed
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -205,7 +156,7 @@ class Lines:
     @cached_property
     def above(self) -> Hits:
         """What is met first above the vertices."""
-        return self.first(self.vertices + FROM * UP, UP)
+        return self._nearest(self._box.above, self.vertices + FROM * UP, UP)
 
     @cached_property
     def below(self) -> Hits:
@@ -214,7 +165,17 @@ class Lines:
 
     def first(self, origins: NDArray[np.float64], direction: NDArray[np.float64]) -> Hits:
         """Return what is met first from origins (q, 3) on, in one direction along z."""
-        found = self._hits(self._box.scene.cast_rays(self._box.rays(origins, direction)))
+        answer = self._box.scene.cast_rays(self._box.rays(origins, direction))
+        return self._nearest(answer, origins, direction)
+
+    def _nearest(
+        self,
+        answer: dict[str, o3d.core.Tensor],
+        origins: NDArray[np.float64],
+        direction: NDArray[np.float64],
+    ) -> Hits:
+        """Return the nearest hits of faces that do not stand upright, by what rays met first of all."""
+        found = self._hits(answer)
         standing = found.triangle < 0
         if not standing.any():
             return found

@@ -75,7 +75,9 @@ class Parted:
     def _between_parts(self) -> Crossings:
         """Find the edges that pierce triangles in the scene, near all parts but the largest."""
         vertices, faces = self._vertices, self._faces
-        _, label = connected_components(self._laplacian, directed=False)
+        count, label = connected_components(self._laplacian, directed=False)
+        if count == 1:
+            return crossings(vertices, faces[:0], edges_of(faces[:0]))
         smaller = (label != np.bincount(label).argmax())[faces[:, 0]]
         near = faces[self._raster.over_or_under(smaller)]
         found = crossings(vertices, near, edges_of(near))

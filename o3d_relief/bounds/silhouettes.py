@@ -63,16 +63,19 @@ def edges_that_turn(
     x, y = np.ascontiguousarray(vertices[:, :2].T)
     a, b, c = corners = np.ascontiguousarray(faces.T)
     facing = np.sign((x[b] - x[a]) * (y[c] - y[a]) - (y[b] - y[a]) * (x[c] - x[a])).astype(np.int64)
-    keys = []
-    for start, end in zip(corners, corners[[1, 2, 0]], strict=True):
+    sided = np.zeros(faces.shape[::-1], dtype=np.int64)
+    for number, (start, end) in enumerate(zip(corners, corners[[1, 2, 0]], strict=True)):
+        edge = np.minimum(start, end) * n + np.maximum(start, end)
         # The side of the third corner, as seen along rising numbers, goes into the last two bits.
-        rising = start < end
-        keys.append(np.where(rising, start * (4 * n) + 4 * end + facing, end * (4 * n) + 4 * start - facing))
-    sided = np.sort(np.concatenate(keys) + 1)
-    edge, side = sided >> 2, (sided & 3) - 1
-    first = np.flatnonzero(np.diff(edge, prepend=-1))
+        sided[number] = 4 * edge + np.sign(end - start) * facing + 1
+    sided = np.sort(sided, axis=None)
+    edge = sided >> 2
+    new = np.ones(len(edge), dtype=bool)
+    np.not_equal(edge[1:], edge[:-1], out=new[1:])
+    first = np.flatnonzero(new)
     count = np.diff(np.append(first, len(edge)))
-    plain = (count == 2) & (side[first] * side[np.minimum(first + 1, len(edge) - 1)] < 0)
+    second = sided[np.minimum(first + 1, len(edge) - 1)]
+    plain = (count == 2) & (((sided[first] & 3) - 1) * ((second & 3) - 1) < 0)
     return np.stack(np.divmod(edge[first], n), axis=1), ~plain
 
 
@@ -168,7 +171,9 @@ def _in_one_star(
     around = faces[at_turning[a] | at_turning[b] | at_turning[c]]
     start = np.ascontiguousarray(around.T)
     end = start[[1, 2, 0]]
-    number = np.searchsorted(edges @ [n, 1], np.minimum(start, end) * n + np.maximum(start, end))
+    number = np.searchsorted(
+        edges[:, 0] * n + edges[:, 1], np.minimum(start, end) * n + np.maximum(start, end)
+    )
     keys = []
     for corner in start:
         chosen = at_turning[corner]
@@ -200,12 +205,15 @@ def _overlapping(
     plane: NDArray[np.float64], edges: NDArray[np.int64], both: NDArray[np.int64]
 ) -> NDArray[np.int64]:
     """Choose the edges whose boxes in the picture overlap or touch: their numbers, (2, q)."""
-    begin, end = (plane.take(tip, axis=0) for tip in edges.T)
+    used = np.zeros(len(edges), dtype=bool)
+    used[both] = True
+    begin, end = (plane.take(tip, axis=0) for tip in edges[used].T)
+    number = np.cumsum(used, dtype=np.int32) - 1
     box = np.concatenate([np.minimum(begin, end), -np.maximum(begin, end)], axis=1)
     turned = np.ascontiguousarray(box[:, [2, 3, 0, 1]])
     near = np.zeros(both.shape[1], dtype=bool)
     for block in range(0, both.shape[1], _BLOCK):
-        one, other = both[:, block : block + _BLOCK]
+        one, other = number[both[:, block : block + _BLOCK]]
         beyond = box.take(one, axis=0)
         beyond += turned.take(other, axis=0)
         x, y, back_x, back_y = (beyond <= _CLEAR).T

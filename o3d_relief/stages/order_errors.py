@@ -24,6 +24,9 @@ _DISC = 0.5
 
 _DIRECTIONS = 64
 
+_MOST_CELLS = 512
+"""Cells, along the longer side, in which vertices near those that are lifted are looked up."""
+
 _LIFT = 3.0
 """Radius of the disc around a vertex that is lifted, in its distance to S."""
 
@@ -219,14 +222,16 @@ def lifting_discs(
     behind = np.flatnonzero(marked)
     step = np.ceil(np.log2(np.maximum(-z[behind], _SAME_HEIGHT))).astype(np.int64)
     for component in np.unique(label[behind]):
-        own = np.flatnonzero(label == component)
+        left = np.flatnonzero(label == component)
         of_own = label[behind] == component
+        widest = _LIFT * 2.0 ** int(step[of_own].max())
         # What is out of the widest reach of all of them is out of every reach.
-        own = own[_within(vertices, own, behind[of_own], _LIFT * 2.0 ** int(step[of_own].max()))]
-        for size in np.unique(step[of_own]):
-            centres = behind[of_own & (step == size)]
+        left = left[_next_to(vertices[left], vertices[behind[of_own]], widest)]
+        for size in np.unique(step[of_own])[::-1]:
             reach = _LIFT * 2.0 ** int(size)
-            marked[own[_within(vertices, own, centres, reach)]] = True
+            found = _within(vertices, left, behind[of_own & (step == size)], reach)
+            marked[left[found]] = True
+            left = left[~found]
     return marked
 
 
@@ -234,5 +239,26 @@ def _within(
     vertices: NDArray[np.float64], chosen: NDArray[np.int64], centres: NDArray[np.int64], reach: float
 ) -> NDArray[np.bool_]:
     """Tell which of chosen vertices lie within reach of any of the centres."""
-    distance, _ = cKDTree(vertices[centres]).query(vertices[chosen], distance_upper_bound=reach)
-    return np.asarray(np.isfinite(distance))
+    near = _next_to(vertices[chosen], vertices[centres], reach)
+    distance, _ = cKDTree(vertices[centres]).query(vertices[chosen[near]], distance_upper_bound=reach)
+    within = np.zeros(len(chosen), dtype=bool)
+    within[near[np.isfinite(distance)]] = True
+    return within
+
+
+def _next_to(places: NDArray[np.float64], centres: NDArray[np.float64], reach: float) -> NDArray[np.int64]:
+    """Return the numbers of places, (p, 3), in or next to the cells of centres, as seen from the front."""
+    low, high = centres[:, :2].min(axis=0) - reach, centres[:, :2].max(axis=0) + reach
+    (left, bottom), (right, top) = low, high
+    x, y = places[:, 0], places[:, 1]
+    near = np.flatnonzero((x >= left) & (x <= right) & (y >= bottom) & (y <= top))
+    size = max(reach, float((high - low).max()) / _MOST_CELLS)
+    marked = np.zeros(((high - low) / size).astype(np.int64) + 3, dtype=bool)
+    row, column = ((centres[:, :2] - low) / size).astype(np.int64).T + 1
+    for above in (-1, 0, 1):
+        for beside in (-1, 0, 1):
+            marked[row + above, column + beside] = True
+    row, column = (
+        ((line[near] - start) / size).astype(np.int32) + 1 for line, start in ((x, left), (y, bottom))
+    )
+    return np.asarray(near[marked[row, column]])

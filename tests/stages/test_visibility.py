@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from o3d_relief import ParameterError
+from o3d_relief.rays import UnitBox
 from o3d_relief.stages.visibility import visible_vertices
 from shapes import grid, hills, joined, moved, sphere
 
@@ -44,3 +45,15 @@ def test_does_not_depend_on_which_way_faces_turn():
 def test_viewpoint_inside_the_scene_is_refused():
     with pytest.raises(ParameterError, match="in front of the scene"):
         visible_vertices(*sphere(), viewpoint=(0, 0, 10))
+
+
+@pytest.mark.parametrize("viewpoint", [None, (3.0, 5.0, 400.0)])
+def test_a_box_at_hand_changes_nothing(viewpoint):
+    # Two sheets closer to each other than rays begin from their vertices.
+    plate = moved((np.array([[-9.0, -9, 0], [9, -9, 0], [0, 9, 0]]), np.array([[0, 1, 2]])), (0.0, 0.0, 30.0))
+    vertices, faces = joined(hills(21), plate, moved(hills(21), (0.01, 0.02, 5e-3)), sphere(12))
+    expected = visible_vertices(vertices, faces, viewpoint=viewpoint)
+    assert expected.any()
+    assert not expected.all()
+    found = visible_vertices(vertices, faces, viewpoint=viewpoint, box=UnitBox(vertices, faces))
+    assert np.array_equal(found, expected)
