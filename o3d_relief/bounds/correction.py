@@ -20,8 +20,12 @@ _REACH = 4.0
 _SHORTEST, _LONGEST = 1.5, 8.0
 """The same in relief units, at least and at most."""
 
-_AROUND, _FURTHEST = 2.0, 32.0
-"""What lies further from what is new than this many reaches, four times as many and so on, stays as it is."""
+_AROUND, _WIDER, _FURTHEST = 1.0, 2.0, 32.0
+"""What lies further from what is new than this many reaches stays as it is; where that leaves no room it is
+so many times as far, and in the end everything may move."""
+
+_HELD = 1e-5
+"""Relief units by which a gap that is held may miss: ten times what programmes are solved to."""
 
 _EXACT = 1e-3
 """Share by which a correction may be above the least one: a thousandth more does not show."""
@@ -61,7 +65,8 @@ class Correction:
         self._reach = np.zeros(len(vertices))
         self._correction = np.zeros(len(vertices))
         self._widening = 1.0
-        self._wide = _AROUND
+        self._wide = np.full(len(vertices), np.inf)
+        self._first = True
 
     def solve(
         self,
@@ -100,17 +105,24 @@ class Correction:
         rows = sp.vstack(
             [pairs.difference(len(self._z)), sp.eye_array(len(self._z), format="csr")[floor]], format="csr"
         )
-        least = np.concatenate([missing, lift[floor]])
+        columns, least = rows.tocsc(), np.concatenate([missing, lift[floor]])
         reach = self._reaches(pairs, missing, lift)
+        waiting = new.copy()
         while True:
-            wide = self._wide if self._correction.any() else np.inf
-            free = np.flatnonzero(self._concerned(reach, rows, new, wide))
-            correction = self._minimum(free, reach[free], rows, least)
-            if correction is not None:
+            failed = np.zeros(len(waiting), dtype=bool)
+            for free in self._regions(reach, columns, waiting):
+                correction = self._minimum(free, reach[free], rows, columns, least)
+                if correction is None:
+                    failed[free] = True
+                else:
+                    self._correction[free] = correction
+            if not failed.any():
                 break
-            if np.isfinite(wide):
+            waiting &= failed
+            if np.isfinite(self._wide[waiting]).all():
                 # What is held around leaves no room; it rarely leaves more the next time.
-                self._wide = 4.0 * wide if wide < _FURTHEST else np.inf
+                self._wide[failed] *= _WIDER
+                self._wide[self._wide > _FURTHEST] = np.inf
                 continue
             if (reach > 0.0).all():
                 raise SolverError(
@@ -119,7 +131,9 @@ class Correction:
                 )
             self._widening *= 2.0  # what lies around the region leaves no room
             reach = self._reaches(pairs, missing, lift)
-        self._correction[free] = correction
+        # The first time everything may move; later on what once needed room gets it again, but not all of it.
+        self._wide = np.where(np.isfinite(self._wide), self._wide, _AROUND if self._first else _FURTHEST)
+        self._first = False
         return np.asarray(self._z + self._correction)
 
     def _minimum(
@@ -127,43 +141,58 @@ class Correction:
         free: NDArray[np.int64],
         reach: NDArray[np.float64],
         rows: sp.csr_array,
+        columns: sp.csc_array,
         least: NDArray[np.float64],
     ) -> NDArray[np.float64] | None:
         """Solve for the corrections of some vertices, the others held; None where there are none."""
         others = self._correction.copy()
         others[free] = 0.0
-        columns = rows[:, free]
-        own = np.diff(columns.indptr) > 0
-        form = self._laplacian[free]
+        within = columns[:, free].tocsr()
+        own = np.flatnonzero(np.diff(within.indptr))
+        form, concerned, least = self._laplacian[free], rows[own], least[own]
+        now = concerned @ self._correction
+        # What was held to a rounding error may leave no room for more, if what lies around stays as it is.
+        least = np.where(now > least - _HELD, np.minimum(least, now), least)
         return minimise(
             form[:, free] + sp.diags_array(self._areas[free] / reach**2),
             -(form @ others),
-            columns[own],
-            (least - rows @ others)[own],
+            within[own],
+            least - concerned @ others,
             tolerance=_EXACT,
         )
 
-    def _concerned(
-        self, reach: NDArray[np.float64], rows: sp.csr_array, new: NDArray[np.bool_], wide: float
-    ) -> NDArray[np.bool_]:
-        """Find the vertices whose corrections hang together with what is new, and not too far from it."""
+    def _regions(
+        self, reach: NDArray[np.float64], columns: sp.csc_array, new: NDArray[np.bool_]
+    ) -> list[NDArray[np.int64]]:
+        """Find the vertices whose corrections hang together with what is new, and not too far from it.
+
+        Each region, of numbers of vertices, can be solved without the others.
+        """
         free = reach > 0.0
-        if np.isfinite(wide):
-            start = np.flatnonzero(new)
-            distance, nearest = cKDTree(self._vertices[start]).query(
-                self._vertices, distance_upper_bound=wide * reach[start].max()
-            )
-            near = np.flatnonzero(np.isfinite(distance))
-            free[near] &= distance[near] <= wide * reach[start][nearest[near]]
-            free[~np.isfinite(distance)] = False
+        wide = self._wide[new]
+        if np.isfinite(wide).all():
+            near = np.zeros(len(free), dtype=bool)
+            for width in np.unique(wide):
+                near |= self._within(np.flatnonzero(new)[wide == width], width * reach)
+            free &= near
         numbers = np.flatnonzero(free)
-        coupling = rows[:, numbers]
-        graph = self._laplacian[numbers][:, numbers] + coupling.T @ coupling
-        count, label = connected_components(graph, directed=False)
+        surface = self._laplacian[numbers][:, numbers]
+        count, label = connected_components(surface + _coupled(columns[:, numbers]), directed=False)
         wanted = np.zeros(count, dtype=bool)
         wanted[label[new[numbers]]] = True
-        free[numbers] = wanted[label]
-        return free
+        order = np.argsort(label, kind="stable")
+        regions = np.split(numbers[order], np.cumsum(np.bincount(label, minlength=count))[:-1])
+        return [regions[number] for number in np.flatnonzero(wanted)]
+
+    def _within(self, start: NDArray[np.int64], most: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Find the vertices that are not further from the nearest of some than `most` (n,) says there."""
+        distance, nearest = cKDTree(self._vertices[start]).query(
+            self._vertices, distance_upper_bound=most[start].max()
+        )
+        found: NDArray[np.bool_] = np.isfinite(distance)
+        near = np.flatnonzero(found)
+        found[near] = distance[near] <= most[start][nearest[near]]
+        return found
 
     def _reaches(
         self,
@@ -185,3 +214,12 @@ class Correction:
         reach = np.zeros(len(self._vertices))
         reach[inside] = reach_there[nearest[inside]]
         return reach
+
+
+def _coupled(columns: sp.csc_array) -> sp.csr_array:
+    """Return a graph (n, n) in which the unknowns of each of some inequalities (m, n) hang together."""
+    rows = columns.tocsr()
+    row = np.repeat(np.arange(rows.shape[0]), np.diff(rows.indptr))
+    same = np.flatnonzero(row[1:] == row[:-1])
+    ends = rows.indices[same], rows.indices[same + 1]
+    return sp.csr_array((np.ones(len(same)), ends), shape=(rows.shape[1], rows.shape[1]))
