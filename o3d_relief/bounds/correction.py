@@ -24,6 +24,9 @@ _AROUND, _WIDER, _FURTHEST = 1.0, 2.0, 32.0
 """What lies further from what is new than this many reaches stays as it is; where that leaves no room it is
 so many times as far, and in the end everything may move."""
 
+_SMALL = 1000
+"""Vertices of regions that are solved together: a programme has its own costs."""
+
 _HELD = 1e-5
 """Relief units by which a gap that is held may miss: ten times what programmes are solved to."""
 
@@ -62,7 +65,8 @@ class Correction:
         self._areas = areas
         self._z = z
         self._size = np.zeros(len(vertices))
-        self._reach = np.zeros(len(vertices))
+        self._nearest = np.full(len(vertices), -1)
+        self._distance = np.full(len(vertices), np.inf)
         self._correction = np.zeros(len(vertices))
         self._widening = 1.0
         self._wide = np.full(len(vertices), np.inf)
@@ -130,6 +134,7 @@ class Correction:
                     "broken near very thin triangles: repair it, or give in_order=False."
                 )
             self._widening *= 2.0  # what lies around the region leaves no room
+            self._distance[:] = np.inf
             reach = self._reaches(pairs, missing, lift)
         # The first time everything may move; later on what once needed room gets it again, but not all of it.
         self._wide = np.where(np.isfinite(self._wide), self._wide, _AROUND if self._first else _FURTHEST)
@@ -166,28 +171,31 @@ class Correction:
     ) -> list[NDArray[np.int64]]:
         """Find the vertices whose corrections hang together with what is new, and not too far from it.
 
-        Each region, of numbers of vertices, can be solved without the others.
+        Each region, of numbers of vertices, can be solved without the others; small ones are put together.
         """
-        free = reach > 0.0
+        numbers = np.flatnonzero(reach > 0.0)
         wide = self._wide[new]
         if np.isfinite(wide).all():
-            near = np.zeros(len(free), dtype=bool)
+            near = np.zeros(len(numbers), dtype=bool)
             for width in np.unique(wide):
-                near |= self._within(np.flatnonzero(new)[wide == width], width * reach)
-            free &= near
-        numbers = np.flatnonzero(free)
+                near |= self._within(numbers, np.flatnonzero(new)[wide == width], width * reach)
+            numbers = numbers[near]
         surface = self._laplacian[numbers][:, numbers]
         count, label = connected_components(surface + _coupled(columns[:, numbers]), directed=False)
         wanted = np.zeros(count, dtype=bool)
         wanted[label[new[numbers]]] = True
         order = np.argsort(label, kind="stable")
-        regions = np.split(numbers[order], np.cumsum(np.bincount(label, minlength=count))[:-1])
-        return [regions[number] for number in np.flatnonzero(wanted)]
+        size = np.where(wanted, np.bincount(label, minlength=count), 0)
+        last = np.flatnonzero(np.diff(np.cumsum(size) // _SMALL))
+        chosen = numbers[order[wanted[label[order]]]]
+        return [part for part in np.split(chosen, np.cumsum(size)[last]) if len(part)]
 
-    def _within(self, start: NDArray[np.int64], most: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Find the vertices that are not further from the nearest of some than `most` (n,) says there."""
+    def _within(
+        self, numbers: NDArray[np.int64], start: NDArray[np.int64], most: NDArray[np.float64]
+    ) -> NDArray[np.bool_]:
+        """Tell which vertices are no further from the nearest of some than `most` (n,) says there."""
         distance, nearest = cKDTree(self._vertices[start]).query(
-            self._vertices, distance_upper_bound=most[start].max()
+            self._vertices[numbers], distance_upper_bound=most[start].max()
         )
         found: NDArray[np.bool_] = np.isfinite(distance)
         near = np.flatnonzero(found)
@@ -204,15 +212,17 @@ class Correction:
         for corners in (pairs.upper, pairs.lower):
             np.maximum.at(self._size, corners.ravel(), np.repeat(missing, 3))
         self._size = np.maximum(self._size, lift)
-        touched = np.flatnonzero(self._size > 0.0)
-        reach_there = np.clip(_REACH * self._size[touched], _SHORTEST, _LONGEST)
-        distance, nearest = cKDTree(self._vertices[touched]).query(
-            self._vertices, distance_upper_bound=self._widening * _REGION * reach_there.max()
-        )
-        near = np.flatnonzero(np.isfinite(distance))
-        inside = near[distance[near] <= self._widening * _REGION * reach_there[nearest[near]]]
-        reach = np.zeros(len(self._vertices))
-        reach[inside] = reach_there[nearest[inside]]
+        touched = self._size > 0.0
+        reach_there = np.where(touched, np.clip(_REACH * self._size, _SHORTEST, _LONGEST), 0.0)
+        fresh = np.flatnonzero(touched & (self._distance > 0.0))
+        if len(fresh):
+            distance, nearest = cKDTree(self._vertices[fresh]).query(
+                self._vertices, distance_upper_bound=self._widening * _REGION * _LONGEST
+            )
+            nearer = distance < self._distance
+            self._distance[nearer], self._nearest[nearer] = distance[nearer], fresh[nearest[nearer]]
+        reach = np.where(self._nearest < 0, 0.0, reach_there[self._nearest])
+        reach[self._distance > self._widening * _REGION * reach] = 0.0
         return reach
 
 
