@@ -24,6 +24,9 @@ _AROUND, _WIDER, _FURTHEST = 1.0, 2.0, 32.0
 """What lies further from what is new than this many reaches stays as it is; where that leaves no room it is
 so many times as far, and in the end everything may move."""
 
+_DIGITS = 8
+"""Decimals to which inequalities are the same; one more would be a rounding error."""
+
 _SMALL = 1000
 """Vertices of regions that are solved together: a programme has its own costs."""
 
@@ -109,7 +112,8 @@ class Correction:
         rows = sp.vstack(
             [pairs.difference(len(self._z)), sp.eye_array(len(self._z), format="csr")[floor]], format="csr"
         )
-        columns, least = rows.tocsc(), np.concatenate([missing, lift[floor]])
+        rows, least = _once(rows, np.concatenate([missing, lift[floor]]))
+        columns = rows.tocsc()
         reach = self._reaches(pairs, missing, lift)
         waiting = new.copy()
         while True:
@@ -224,6 +228,20 @@ class Correction:
         reach = np.where(self._nearest < 0, 0.0, reach_there[self._nearest])
         reach[self._distance > self._widening * _REGION * reach] = 0.0
         return reach
+
+
+def _once(rows: sp.csr_array, least: NDArray[np.float64]) -> tuple[sp.csr_array, NDArray[np.float64]]:
+    """Leave out inequalities that ask for no more than another one of the same row.
+
+    Where edges meet in the picture all triangles at the one tell the same of all at the other.
+    """
+    # Equal rows have equal products with any two vectors; others do by a chance of one in millions.
+    mark = np.round(rows @ np.random.default_rng(0).random((rows.shape[1], 2)), _DIGITS)
+    order = np.lexsort((-least, mark[:, 1], mark[:, 0]))
+    other = np.ones(len(order), dtype=bool)
+    other[1:] = (mark[order[1:]] != mark[order[:-1]]).any(axis=1)
+    chosen = np.sort(order[other])
+    return rows[chosen], least[chosen]
 
 
 def _coupled(columns: sp.csc_array) -> sp.csr_array:
