@@ -20,8 +20,18 @@ _REACH = 4.0
 _SHORTEST, _LONGEST = 1.5, 8.0
 """The same in relief units, at least and at most."""
 
-_AROUND, _FURTHEST = 2.0, 32.0
-"""What lies further from what is new than this many reaches, four times as many and so on, stays as it is."""
+_AROUND, _WIDER, _FURTHEST = 1.0, 2.0, 32.0
+"""What lies further from what is new than this many reaches stays as it is; where that leaves no room it is
+so many times as far, and in the end everything may move."""
+
+_DIGITS = 8
+"""Decimals to which inequalities are the same; one more would be a rounding error."""
+
+_SMALL = 1000
+"""Vertices of regions that are solved together: a programme has its own costs."""
+
+_HELD = 1e-5
+"""Relief units by which a gap that is held may miss: ten times what programmes are solved to."""
 
 _EXACT = 1e-3
 """Share by which a correction may be above the least one: a thousandth more does not show."""
@@ -58,10 +68,12 @@ class Correction:
         self._areas = areas
         self._z = z
         self._size = np.zeros(len(vertices))
-        self._reach = np.zeros(len(vertices))
+        self._nearest = np.full(len(vertices), -1)
+        self._distance = np.full(len(vertices), np.inf)
         self._correction = np.zeros(len(vertices))
         self._widening = 1.0
-        self._wide = _AROUND
+        self._wide = np.full(len(vertices), np.inf)
+        self._first = True
 
     def solve(
         self,
@@ -100,17 +112,25 @@ class Correction:
         rows = sp.vstack(
             [pairs.difference(len(self._z)), sp.eye_array(len(self._z), format="csr")[floor]], format="csr"
         )
-        least = np.concatenate([missing, lift[floor]])
+        rows, least = _once(rows, np.concatenate([missing, lift[floor]]))
+        columns = rows.tocsc()
         reach = self._reaches(pairs, missing, lift)
+        waiting = new.copy()
         while True:
-            wide = self._wide if self._correction.any() else np.inf
-            free = np.flatnonzero(self._concerned(reach, rows, new, wide))
-            correction = self._minimum(free, reach[free], rows, least)
-            if correction is not None:
+            failed = np.zeros(len(waiting), dtype=bool)
+            for free in self._regions(reach, columns, waiting):
+                correction = self._minimum(free, reach[free], rows, columns, least)
+                if correction is None:
+                    failed[free] = True
+                else:
+                    self._correction[free] = correction
+            if not failed.any():
                 break
-            if np.isfinite(wide):
+            waiting &= failed
+            if np.isfinite(self._wide[waiting]).all():
                 # What is held around leaves no room; it rarely leaves more the next time.
-                self._wide = 4.0 * wide if wide < _FURTHEST else np.inf
+                self._wide[failed] *= _WIDER
+                self._wide[self._wide > _FURTHEST] = np.inf
                 continue
             if (reach > 0.0).all():
                 raise SolverError(
@@ -118,8 +138,11 @@ class Correction:
                     "broken near very thin triangles: repair it, or give in_order=False."
                 )
             self._widening *= 2.0  # what lies around the region leaves no room
+            self._distance[:] = np.inf
             reach = self._reaches(pairs, missing, lift)
-        self._correction[free] = correction
+        # The first time everything may move; later on what once needed room gets it again, but not all of it.
+        self._wide = np.where(np.isfinite(self._wide), self._wide, _AROUND if self._first else _FURTHEST)
+        self._first = False
         return np.asarray(self._z + self._correction)
 
     def _minimum(
@@ -127,43 +150,61 @@ class Correction:
         free: NDArray[np.int64],
         reach: NDArray[np.float64],
         rows: sp.csr_array,
+        columns: sp.csc_array,
         least: NDArray[np.float64],
     ) -> NDArray[np.float64] | None:
         """Solve for the corrections of some vertices, the others held; None where there are none."""
         others = self._correction.copy()
         others[free] = 0.0
-        columns = rows[:, free]
-        own = np.diff(columns.indptr) > 0
-        form = self._laplacian[free]
+        within = columns[:, free].tocsr()
+        own = np.flatnonzero(np.diff(within.indptr))
+        form, concerned, least = self._laplacian[free], rows[own], least[own]
+        now = concerned @ self._correction
+        # What was held to a rounding error may leave no room for more, if what lies around stays as it is.
+        least = np.where(now > least - _HELD, np.minimum(least, now), least)
         return minimise(
             form[:, free] + sp.diags_array(self._areas[free] / reach**2),
             -(form @ others),
-            columns[own],
-            (least - rows @ others)[own],
+            within[own],
+            least - concerned @ others,
             tolerance=_EXACT,
         )
 
-    def _concerned(
-        self, reach: NDArray[np.float64], rows: sp.csr_array, new: NDArray[np.bool_], wide: float
-    ) -> NDArray[np.bool_]:
-        """Find the vertices whose corrections hang together with what is new, and not too far from it."""
-        free = reach > 0.0
-        if np.isfinite(wide):
-            start = np.flatnonzero(new)
-            distance, nearest = cKDTree(self._vertices[start]).query(
-                self._vertices, distance_upper_bound=wide * reach[start].max()
-            )
-            near = np.flatnonzero(np.isfinite(distance))
-            free[near] &= distance[near] <= wide * reach[start][nearest[near]]
-            free[~np.isfinite(distance)] = False
-        numbers = np.flatnonzero(free)
-        coupling = rows[:, numbers]
-        graph = self._laplacian[numbers][:, numbers] + coupling.T @ coupling
-        count, label = connected_components(graph, directed=False)
+    def _regions(
+        self, reach: NDArray[np.float64], columns: sp.csc_array, new: NDArray[np.bool_]
+    ) -> list[NDArray[np.int64]]:
+        """Find the vertices whose corrections hang together with what is new, and not too far from it.
+
+        Each region, of numbers of vertices, can be solved without the others; small ones are put together.
+        """
+        numbers = np.flatnonzero(reach > 0.0)
+        wide = self._wide[new]
+        if np.isfinite(wide).all():
+            near = np.zeros(len(numbers), dtype=bool)
+            for width in np.unique(wide):
+                near |= self._within(numbers, np.flatnonzero(new)[wide == width], width * reach)
+            numbers = numbers[near]
+        surface = self._laplacian[numbers][:, numbers]
+        count, label = connected_components(surface + _coupled(columns[:, numbers]), directed=False)
         wanted = np.zeros(count, dtype=bool)
         wanted[label[new[numbers]]] = True
-        free[numbers] = wanted[label]
-        return free
+        order = np.argsort(label, kind="stable")
+        size = np.where(wanted, np.bincount(label, minlength=count), 0)
+        last = np.flatnonzero(np.diff(np.cumsum(size) // _SMALL))
+        chosen = numbers[order[wanted[label[order]]]]
+        return [part for part in np.split(chosen, np.cumsum(size)[last]) if len(part)]
+
+    def _within(
+        self, numbers: NDArray[np.int64], start: NDArray[np.int64], most: NDArray[np.float64]
+    ) -> NDArray[np.bool_]:
+        """Tell which vertices are no further from the nearest of some than `most` (n,) says there."""
+        distance, nearest = cKDTree(self._vertices[start]).query(
+            self._vertices[numbers], distance_upper_bound=most[start].max()
+        )
+        found: NDArray[np.bool_] = np.isfinite(distance)
+        near = np.flatnonzero(found)
+        found[near] = distance[near] <= most[start][nearest[near]]
+        return found
 
     def _reaches(
         self,
@@ -175,13 +216,38 @@ class Correction:
         for corners in (pairs.upper, pairs.lower):
             np.maximum.at(self._size, corners.ravel(), np.repeat(missing, 3))
         self._size = np.maximum(self._size, lift)
-        touched = np.flatnonzero(self._size > 0.0)
-        reach_there = np.clip(_REACH * self._size[touched], _SHORTEST, _LONGEST)
-        distance, nearest = cKDTree(self._vertices[touched]).query(
-            self._vertices, distance_upper_bound=self._widening * _REGION * reach_there.max()
-        )
-        near = np.flatnonzero(np.isfinite(distance))
-        inside = near[distance[near] <= self._widening * _REGION * reach_there[nearest[near]]]
-        reach = np.zeros(len(self._vertices))
-        reach[inside] = reach_there[nearest[inside]]
+        touched = self._size > 0.0
+        reach_there = np.where(touched, np.clip(_REACH * self._size, _SHORTEST, _LONGEST), 0.0)
+        fresh = np.flatnonzero(touched & (self._distance > 0.0))
+        if len(fresh):
+            distance, nearest = cKDTree(self._vertices[fresh]).query(
+                self._vertices, distance_upper_bound=self._widening * _REGION * _LONGEST
+            )
+            nearer = distance < self._distance
+            self._distance[nearer], self._nearest[nearer] = distance[nearer], fresh[nearest[nearer]]
+        reach = np.where(self._nearest < 0, 0.0, reach_there[self._nearest])
+        reach[self._distance > self._widening * _REGION * reach] = 0.0
         return reach
+
+
+def _once(rows: sp.csr_array, least: NDArray[np.float64]) -> tuple[sp.csr_array, NDArray[np.float64]]:
+    """Leave out inequalities that ask for no more than another one of the same row.
+
+    Where edges meet in the picture all triangles at the one tell the same of all at the other.
+    """
+    # Equal rows have equal products with any two vectors; others do by a chance of one in millions.
+    mark = np.round(rows @ np.random.default_rng(0).random((rows.shape[1], 2)), _DIGITS)
+    order = np.lexsort((-least, mark[:, 1], mark[:, 0]))
+    other = np.ones(len(order), dtype=bool)
+    other[1:] = (mark[order[1:]] != mark[order[:-1]]).any(axis=1)
+    chosen = np.sort(order[other])
+    return rows[chosen], least[chosen]
+
+
+def _coupled(columns: sp.csc_array) -> sp.csr_array:
+    """Return a graph (n, n) in which the unknowns of each of some inequalities (m, n) hang together."""
+    rows = columns.tocsr()
+    row = np.repeat(np.arange(rows.shape[0]), np.diff(rows.indptr))
+    same = np.flatnonzero(row[1:] == row[:-1])
+    ends = rows.indices[same], rows.indices[same + 1]
+    return sp.csr_array((np.ones(len(same)), ends), shape=(rows.shape[1], rows.shape[1]))
