@@ -20,6 +20,7 @@ def grid_pairs(
     side: int = 1024,
     low: NDArray[np.float64] | None = None,
     high: NDArray[np.float64] | None = None,
+    before: NDArray[np.float64] | None = None,
 ) -> Pairs:
     """Pair the points that follow each other on the lines of a regular grid.
 
@@ -31,6 +32,8 @@ def grid_pairs(
         Number of lines along x and along y.
     low, high : (3,) float64, optional
         Corners of the box that the grid covers, that of the vertices where omitted.
+    before : (n,) float64, optional
+        Other heights: pairs of triangles of which these say, too, that the upper one is above are left out.
 
     Returns
     -------
@@ -58,11 +61,24 @@ def grid_pairs(
     # One sort by line and height on it: t is well below the factor's size, and float64 has room for both.
     order = np.argsort(line + t / (4.0 * max(float(t.max(initial=0.0)), 1.0)), kind="stable")
     following = np.flatnonzero(line[order][1:] == line[order][:-1])
+    if before is not None:
+        following = following[
+            _may_turn(before[faces], triangle[order[following]], triangle[order[following + 1]])
+        ]
     lower, upper = (
         _on_line(vertices, faces[triangle[chosen]], weights[chosen], start[line[chosen], :2])
         for chosen in (order[following], order[following + 1])
     )
     return next_to_each_other(vertices[:, 2], *upper, *lower)
+
+
+def _may_turn(
+    heights: NDArray[np.float64], lower: NDArray[np.int64], upper: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """Tell which triangles, (q,), are not wholly above others, for the heights of all corners (l, 3)."""
+    least, most = heights.min(axis=1), heights.max(axis=1)
+    beyond = 2.0 * _NARROW * (most - least)  # points may be that far beside their triangles
+    return np.asarray((least - beyond)[upper] < (most + beyond)[lower])
 
 
 def _on_line(
