@@ -12,7 +12,7 @@ from o3d_relief.linalg.factor import Factor
 
 __all__ = ["Everywhere", "Solve", "Within"]
 
-_FILL = 1.2
+_FILL = 1.05
 """Growth of a factor, by rows that have come, from which on its unknowns are ordered anew."""
 
 Solve = Callable[[NDArray[np.float64]], NDArray[np.float64]]
