@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import open3d as o3d
 from numpy.typing import NDArray
 
-from o3d_relief.bounds.lines import UP, Lines, weights_of
+from o3d_relief.bounds.lines import UP, Lines, UnitBox, weights_of
 from o3d_relief.bounds.pairs import Pairs, next_to_each_other
 
 __all__ = ["grid_pairs"]
@@ -47,11 +48,8 @@ def grid_pairs(
     low = vertices.min(axis=0) if low is None else low
     high = vertices.max(axis=0) if high is None else high
     steps = (np.arange(side) + 0.5) / side
-    x, y = np.meshgrid(low[0] + steps * (high[0] - low[0]), low[1] + steps * (high[1] - low[1]))
-    start = np.stack(
-        [x.ravel(), y.ravel(), np.full(side * side, vertices[:, 2].min() - 0.01 * box.size)], axis=1
-    )
-    hits = box.scene.list_intersections(box.rays(start, UP))
+    x, y = (low[axis] + steps * (high[axis] - low[axis]) for axis in (0, 1))
+    hits = box.scene.list_intersections(_grid_rays(box, x, y, vertices[:, 2].min() - 0.01 * box.size))
     triangle = hits["primitive_ids"].numpy().astype(np.int64)
     weights = weights_of(hits["primitive_uvs"].numpy())
     usable = np.flatnonzero(~lines.borders.grazed(triangle, weights))
@@ -66,10 +64,28 @@ def grid_pairs(
             _may_turn(before[faces], triangle[order[following]], triangle[order[following + 1]])
         ]
     lower, upper = (
-        _on_line(vertices, faces[triangle[chosen]], weights[chosen], start[line[chosen], :2])
+        _on_line(
+            vertices,
+            faces[triangle[chosen]],
+            weights[chosen],
+            x[line[chosen] % side],
+            y[line[chosen] // side],
+        )
         for chosen in (order[following], order[following + 1])
     )
     return next_to_each_other(vertices[:, 2], *upper, *lower)
+
+
+def _grid_rays(
+    box: UnitBox, x: NDArray[np.float64], y: NDArray[np.float64], height: float
+) -> o3d.core.Tensor:
+    """Return the rays upwards from a height at all of x and y, x first."""
+    rays = np.zeros((len(y), len(x), 6), dtype=np.float32)
+    rays[:, :, 0] = (x - box.middle[0]) / box.size
+    rays[:, :, 1] = ((y - box.middle[1]) / box.size)[:, None]
+    rays[:, :, 2] = (height - box.middle[2]) / box.size
+    rays[:, :, 3:] = UP
+    return o3d.core.Tensor(rays.reshape(-1, 6))
 
 
 def _may_turn(
@@ -85,14 +101,14 @@ def _on_line(
     vertices: NDArray[np.float64],
     corners: NDArray[np.int64],
     weights: NDArray[np.float64],
-    line: NDArray[np.float64],
+    *line: NDArray[np.float64],
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return points of triangles, (q, 3) corners and weights, put onto their lines (q, 2) exactly.
+    """Return points of triangles, (q, 3) corners and weights, put onto their lines, (q,) x and y, exactly.
 
     Rays in float32 miss them by a little, which is much in z where a triangle is steep. Of those that are so
     narrow that the line passes beside them, the weights stay.
     """
-    x, y = (np.ascontiguousarray(vertices[:, axis])[corners.T] - line[:, axis] for axis in (0, 1))
+    x, y = (np.ascontiguousarray(vertices[:, axis])[corners.T] - line[axis] for axis in (0, 1))
     exact = np.stack([x[i - 2] * y[i - 1] - x[i - 1] * y[i - 2] for i in range(3)], axis=1)
     area = exact.sum(axis=1, keepdims=True)
     exact /= np.where(area == 0.0, 1.0, area)
