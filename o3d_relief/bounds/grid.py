@@ -53,7 +53,7 @@ def grid_pairs(
     triangle = hits["primitive_ids"].numpy().astype(np.int64)
     weights = weights_of(hits["primitive_uvs"].numpy())
     usable = np.flatnonzero(~lines.borders.grazed(triangle, weights))
-    triangle, weights = triangle[usable], weights[usable]
+    triangle, weights = triangle.take(usable), weights.take(usable, axis=0)
     line = hits["ray_ids"].numpy()[usable].astype(np.int64)
     t = hits["t_hit"].numpy()[usable].astype(np.float64)
     # One sort by line and height on it: t is well below the factor's size, and float64 has room for both.
@@ -66,8 +66,8 @@ def grid_pairs(
     lower, upper = (
         _on_line(
             vertices,
-            faces[triangle[chosen]],
-            weights[chosen],
+            faces.take(triangle[chosen], axis=0),
+            weights.take(chosen, axis=0),
             x[line[chosen] % side],
             y[line[chosen] // side],
         )
