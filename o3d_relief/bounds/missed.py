@@ -146,7 +146,7 @@ class BetweenLines:
         low, high = self._vertices.min(axis=0), self._vertices.max(axis=0)
         lines = Lines(cut.vertices, lying)
         at_vertices = [vertex_pairs(lines, aside=aside) for aside in _ASIDE]
-        on_grid = grid_pairs(lines, low=low, high=high)
+        on_grid = grid_pairs(lines, low=low, high=high, before=before)
         turned = _turned(Pairs.join([*at_vertices, on_grid]), before)
         turned = turned.select(~origin.crossed(turned.upper, turned.lower))
         found = Pairs.join([met.select(~known).pairs(before, after), turned])

@@ -34,6 +34,9 @@ class Factor:
     ----------
     order : (n,) int64
         The unknowns in the order in which right-hand sides of several columns are given.
+    minimum_degree : scipy.sparse.linalg.SuperLU or None
+        The factor, where the unknowns are ordered by minimum degree: without positions, and where planes cut
+        too much.
 
     Raises
     ------
@@ -48,9 +51,10 @@ class Factor:
             if dissection is not None and dissection.cut < _BADLY_CUT:
                 self.order = dissection.order
                 self._factor: Cholesky | sla.SuperLU = Cholesky(matrix, dissection)
+                self.minimum_degree = None
             else:
                 # Minimum degree is better where planes cut much, and slow on large fine surfaces.
-                self._factor = superlu(matrix)
+                self._factor = self.minimum_degree = superlu(matrix)
         self.order.flags.writeable = False
 
     def solve(self, right_hand_side: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ from o3d_relief.linalg.factor import Factor, superlu
 
 __all__ = ["Everywhere", "Solve", "Within"]
 
-_FILL = 1.2
+_FILL = 1.05
 """Growth of a factor, by rows that have come, from which on its unknowns are ordered anew."""
 
 Solve = Callable[[NDArray[np.float64]], NDArray[np.float64]]
@@ -30,6 +30,7 @@ class Everywhere:
 
     def __init__(self, form: sp.csr_array, positions: NDArray[np.float64] | None) -> None:
         self._form, self._positions = form, positions
+        self._order, self._entries = np.zeros(0, dtype=np.int64), 0
 
     def prepare(self, diagonal: NDArray[np.float64], rows: sp.csr_array, stiff: NDArray[np.float64]) -> Solve:
         """Return what solves (H + D + R' S R) x = b for a right-hand side b.
@@ -54,7 +55,25 @@ class Everywhere:
             The matrix is singular.
         """
         springs = rows.T @ (sp.diags_array(stiff) @ rows)
-        return Factor((self._form + sp.diags_array(diagonal) + springs).tocsr(), self._positions).solve
+        matrix = (self._form + sp.diags_array(diagonal) + springs).tocsr()
+        if not self._entries:
+            factor = Factor(matrix, self._positions)
+            if factor.minimum_degree is not None:
+                # The next matrices are nearly the same: their unknowns are taken in this order.
+                self._order = np.argsort(factor.minimum_degree.perm_c)
+                self._entries = factor.minimum_degree.nnz
+            return factor.solve
+        order = self._order
+        ordered = superlu(matrix[order][:, order], ordered=True)
+        if ordered.nnz > _FILL * self._entries:
+            self._entries = 0
+
+        def solve(right: NDArray[np.float64]) -> NDArray[np.float64]:
+            solution = np.zeros(len(right))
+            solution[order] = ordered.solve(right[order])
+            return solution
+
+        return solve
 
 
 class Within:

@@ -26,3 +26,15 @@ def test_lines_of_the_grid_meet_steep_triangles_exactly():
     pairs = grid_pairs(Lines(*joined((steep, faces), (above, other_faces))), side=37)
     assert len(pairs) == 37 * 37
     assert pairs.gap == pytest.approx(3.0, abs=1e-9)
+
+
+def test_pairs_that_cannot_have_turned_are_left_out_where_other_heights_are_given():
+    vertices, faces = joined(grid(6), moved(grid(4, size=40.0), (3.0, 5.0, 10.0)))
+    lines = Lines(vertices, faces)
+    everything = grid_pairs(lines, side=64)
+    tilted = np.where(vertices[:, 2] > 5.0, 0.5 * vertices[:, 0], vertices[:, 2])
+    found = grid_pairs(lines, side=64, before=tilted)
+    assert len(grid_pairs(lines, side=64, before=vertices[:, 2])) == 0
+    assert 0 < len(found) < len(everything)
+    turned = [int((np.subtract(*pairs.heights(tilted)) < 0.0).sum()) for pairs in (everything, found)]
+    assert turned[0] == turned[1] > 0

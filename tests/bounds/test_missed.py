@@ -104,3 +104,18 @@ def test_what_is_close_is_looked_at_first_and_found_the_same():
     assert np.sort(gap) == pytest.approx(np.sort(same), abs=1e-4)
     assert len(between._close_by(z)) == len(gap)
     assert len(between._close_by(vertices[:, 2])) == 0
+
+
+def test_what_has_turned_is_found_where_much_crosses_elsewhere():
+    low, high = grid(30), moved(grid(30, size=90.0), (3.0, 5.0, 10.0))
+    beside = [
+        moved(part, (200.0, 0.0, 0.0)) for part in (grid(6), moved(grid(4, size=40.0), (3.0, 5.0, 10.0)))
+    ]
+    vertices, faces = joined(low, high, *beside)
+    upper, right = vertices[:, 2] > 5.0, vertices[:, 0] > 100.0
+    tilted = np.where(upper, 20.0 - 0.1 * vertices[:, 0], 20.0)
+    swapped = np.where(upper, 4.0, 9.0)
+    rows, gap = BetweenLines(vertices, faces).missed(np.where(right, swapped, tilted))
+    at_right = (vertices[rows.indices, 0] > 100.0).reshape(len(gap), -1).all(axis=1)
+    assert (~at_right).sum() > 200
+    assert at_right.any()
