@@ -20,7 +20,7 @@ _FORGETFUL = 7
 """In so many rounds, pairs with room to spare are no longer held, but for those that were wrong again after
 that. Later on every pair that was ever wrong stays held, so that the rounds come to an end."""
 
-_ROUNDS = 40
+_ROUNDS = 60
 
 _FEW = 3000
 """Pairs out of order on lines up to which edges that pierce triangles are looked for at the same time."""
