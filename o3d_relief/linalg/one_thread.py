@@ -16,8 +16,10 @@ def one_thread() -> AbstractContextManager[Any]:
 
     Examples
     --------
+    >>> import numpy as np
     >>> with one_thread():
-    ...     total = np.ones(3) @ np.ones(3)
+    ...     float(np.ones(3) @ np.ones(3))
+    3.0
     """
     return cast(AbstractContextManager[Any], _libraries().limit(limits=1))
 
