@@ -66,7 +66,7 @@ class ReliefEditor:
     bounded mode has no points; its preview is linear scaling, from which its search starts.
 
     Memory: 4 n k bytes for the responses, 128 MB for 250,000 vertices and k = 128; while they are computed,
-    and as long as parts are tied, some 1.8 kB for each vertex.
+    and as long as parts are tied, 1 to 2 kB for each vertex.
 
     Parameters
     ----------

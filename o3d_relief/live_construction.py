@@ -85,7 +85,7 @@ class LiveConstruction:
     Raises
     ------
     SolverError
-        A system is singular.
+        A system is singular or not positive definite.
     """
 
     def __init__(

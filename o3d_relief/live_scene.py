@@ -111,7 +111,7 @@ class LivePoints:
     ParameterError
         More clusters than vertices.
     SolverError
-        A system is singular.
+        A system is singular or not positive definite.
     """
 
     def __init__(self, scene: LiveScene, params: ReliefParams, progress: Progress = NOBODY) -> None:

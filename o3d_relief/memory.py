@@ -52,9 +52,10 @@ def memory_kept() -> Iterator[None]:
     """Keep what is freed within the block for whatever is asked for next.
 
     glibc gives an array of more than 32 MB back to the system as soon as it is freed, and the next one gets
-    fresh pages, which the kernel has to clear. Where blocks overlap, in threads, the last one that ends
-    returns to the usual and gives everything back. Nothing happens on other systems, and where the
-    environment holds settings of malloc.
+    fresh pages, which the kernel has to clear: a third of the time at ten million vertices. It concerns what
+    the main thread allocates; the others have memory of their own. Where blocks overlap, in threads, the last
+    one that ends returns to the usual and gives everything back. Nothing happens on other systems, and where
+    the environment holds settings of malloc.
     """
     calls = _calls()
     if calls is None:

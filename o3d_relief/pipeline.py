@@ -133,6 +133,7 @@ def make_relief(
         z = _attenuated(
             vertices, visible, laplacian, slivers, scene, Lines(vertices, faces, box), params, journal
         )
+    del box  # it takes much of the memory, and no more rays are cast through it
 
     journal.begin("trim")
     out_faces, turned = turned_to_viewer(in_faces, scene, vertices, visible, laplacian)

@@ -1,3 +1,4 @@
+import sys
 import threading
 
 import pytest
@@ -36,16 +37,17 @@ def test_the_last_thread_decides(calls):
     def other():
         with memory_kept():
             inside.set()
-            done.wait()
+            done.wait(10)
 
-    thread = threading.Thread(target=other)
+    thread = threading.Thread(target=other, daemon=True)
     thread.start()
-    inside.wait()
+    assert inside.wait(10)
     with memory_kept():
         pass
-    assert "trim" not in calls
+    early = "trim" in calls
     done.set()
-    thread.join()
+    thread.join(10)
+    assert not early
     assert calls[-1] == "trim"
 
 
@@ -60,6 +62,17 @@ def test_settings_of_the_environment_are_left_alone(monkeypatch):
     assert memory._calls() is None
     with memory_kept():
         assert memory._blocks.entered == 0
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="glibc is Linux's")
+def test_malloc_knows_the_settings(monkeypatch):
+    for name in memory._OWN_CHOICE:
+        monkeypatch.delenv(name, raising=False)
+    calls = memory._calls()
+    if calls is None:
+        pytest.skip("not glibc")
+    mallopt, _ = calls
+    assert [mallopt(*setting) for setting in (*memory._KEEPING, *memory._USUAL)] == [1] * 5
 
 
 def test_other_systems_are_left_alone(monkeypatch):

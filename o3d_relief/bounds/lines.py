@@ -137,6 +137,10 @@ class Lines:
         return UnitBox(self.vertices, self.faces) if self._given is None else self._given
 
     @cached_property
+    def _lying_box(self) -> UnitBox:
+        return UnitBox(self.vertices, self.faces)
+
+    @cached_property
     def _number(self) -> NDArray[np.int64]:
         """The number of each face of the box among those that do not stand upright, -1 for the others."""
         if self._given is None:
@@ -175,32 +179,36 @@ class Lines:
         direction: NDArray[np.float64],
     ) -> Hits:
         """Return the nearest hits of faces that do not stand upright, by what rays met first of all."""
-        found = self._hits(answer)
+        found = _read(answer, self._number, self.size)
         standing = found.triangle < 0
         if not standing.any():
             return found
-        # Behind what stands upright may be what is met first.
-        ray = found.ray[standing]
-        behind = self.all(origins[ray], direction)
-        order = np.lexsort((behind.distance, behind.ray))
-        nearest = behind.select(order[np.flatnonzero(np.diff(behind.ray[order], prepend=-1))])
-        return found.select(np.flatnonzero(~standing)).joined(nearest.of(ray))
+        others = found.select(np.flatnonzero(~standing))
+        if len(self.faces) == 0:
+            return others
+        # Behind what stands upright may be what is met first. To list all that is met would be too much where
+        # a wall is a little rough: every other of its vertices has half of the wall above it.
+        ray, box = found.ray[standing], self._lying_box
+        answer = box.scene.cast_rays(box.rays(origins[ray], direction))
+        return others.joined(_read(answer, np.arange(len(self.faces)), box.size).of(ray))
 
     def all(self, origins: NDArray[np.float64], direction: NDArray[np.float64]) -> Hits:
         """Return all that is met from origins (q, 3) on, in one direction along z, by ray, in no order."""
-        found = self._hits(self._box.scene.list_intersections(self._box.rays(origins, direction)))
+        answer = self._box.scene.list_intersections(self._box.rays(origins, direction))
+        found = _read(answer, self._number, self.size)
         return found.select(np.flatnonzero(found.triangle >= 0))
 
-    def _hits(self, answer: dict[str, o3d.core.Tensor]) -> Hits:
-        """Read what a scene answers."""
-        triangle = answer["primitive_ids"].numpy()
-        met = np.flatnonzero(triangle != MISS)
-        return Hits(
-            ray=answer["ray_ids"].numpy()[met].astype(np.int64) if "ray_ids" in answer else met,
-            triangle=self._number[triangle[met].astype(np.int64)],
-            weights=weights_of(answer["primitive_uvs"].numpy()[met]),
-            distance=answer["t_hit"].numpy()[met].astype(np.float64) * self._box.size,
-        )
+
+def _read(answer: dict[str, o3d.core.Tensor], number: NDArray[np.int64], size: float) -> Hits:
+    """Read what a scene of a size answers, whose faces have these numbers."""
+    triangle = answer["primitive_ids"].numpy()
+    met = np.flatnonzero(triangle != MISS)
+    return Hits(
+        ray=answer["ray_ids"].numpy()[met].astype(np.int64) if "ray_ids" in answer else met,
+        triangle=number[triangle[met].astype(np.int64)],
+        weights=weights_of(answer["primitive_uvs"].numpy()[met]),
+        distance=answer["t_hit"].numpy()[met].astype(np.float64) * size,
+    )
 
 
 def weights_of(uv: NDArray[np.float32]) -> NDArray[np.float64]:

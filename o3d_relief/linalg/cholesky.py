@@ -85,7 +85,7 @@ class Cholesky:
         With `overwrite` the solution takes the place of the right-hand sides. Blocks that no right-hand side
         reaches are passed over on the way up.
         """
-        result = right_hand_sides if overwrite else np.array(right_hand_sides, order="C")
+        result = right_hand_sides if overwrite else np.array(right_hand_sides, dtype=np.float64, order="C")
         if len(result) == 0:
             return result
         filled = result != 0.0 if result.ndim == 1 else result.any(axis=1)

@@ -52,7 +52,7 @@ class Everywhere:
         Raises
         ------
         SolverError
-            The matrix is singular.
+            The matrix is singular or not positive definite.
         """
         springs = rows.T @ (sp.diags_array(stiff) @ rows)
         matrix = (self._form + sp.diags_array(diagonal) + springs).tocsr()

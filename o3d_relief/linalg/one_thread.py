@@ -6,6 +6,7 @@ from contextlib import AbstractContextManager
 from functools import cache
 from typing import Any, cast
 
+import scipy.linalg  # noqa: F401  loads its libraries
 from threadpoolctl import ThreadpoolController
 
 __all__ = ["one_thread"]
@@ -26,5 +27,5 @@ def one_thread() -> AbstractContextManager[Any]:
 
 @cache
 def _libraries() -> ThreadpoolController:
-    """Find the libraries once, which takes milliseconds: numpy and scipy have loaded theirs by now."""
+    """Find the libraries once, which takes milliseconds; numpy and scipy load theirs when imported."""
     return ThreadpoolController()

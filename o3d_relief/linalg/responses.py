@@ -50,7 +50,7 @@ class Responses:
     Raises
     ------
     SolverError
-        The system is singular.
+        The system is singular or not positive definite.
     """
 
     def __init__(

@@ -38,3 +38,18 @@ def test_a_box_of_all_faces_changes_nothing(find):
         for pairs in (one, other):
             upper, lower = pairs.heights(z)
             assert upper == pytest.approx(lower, abs=1e-2)
+
+
+def test_what_is_behind_a_rough_wall_is_found_without_listing_the_wall(monkeypatch):
+    wall, faces = grid(40, size=60.0)
+    rough = np.random.default_rng(0).normal(scale=1e-5, size=(2, len(wall)))
+    upright = np.stack([0.8 * wall[:, 0] + rough[0], 0.5 * wall[:, 0] + rough[1], wall[:, 1]], axis=1)
+    vertices, faces = joined((upright, faces), moved(grid(9, size=90.0), (0.37, 0.21, 40.0)))
+    box = UnitBox(vertices, faces)
+    lines = Lines(vertices, faces, box)
+    first = box.above["primitive_ids"].numpy()[: len(wall)]
+    assert (first < len(faces) - 2 * 8 * 8).mean() > 0.5  # most vertices meet the wall itself
+    monkeypatch.setattr(Lines, "all", None)
+    one, other = vertex_pairs(lines), vertex_pairs(Lines(vertices, faces))
+    assert len(one) == len(other) > len(wall) / 2
+    assert one.gap.sum() == pytest.approx(other.gap.sum(), rel=1e-6)
