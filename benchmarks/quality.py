@@ -8,7 +8,6 @@ OUTPUT. Numbers that OUTPUT/quality.json has already are kept; delete the file t
 from __future__ import annotations
 
 import argparse
-import csv
 import json
 import sys
 import time
@@ -27,6 +26,7 @@ from baselines.height_field import sample
 from baselines.linear import linear_scaling
 from baselines.schueller import appearance_mimicking
 from baselines.weyrich import bas_relief
+from manifest import row_of
 from o3d_relief.measure import Yardstick
 from o3d_relief.scene.convert import arrays_mesh
 from o3d_relief.scene.frame import relief_frame, to_relief_units
@@ -126,8 +126,7 @@ METHODS: dict[str, Callable[[Scene, float], Made | None]] = {
 
 def read_scene(folder: Path, name: str) -> Scene:
     """Read a mesh, turn it as the manifest says and weld it."""
-    with (folder / "MANIFEST.tsv").open(encoding="utf-8") as file:
-        row = next(row for row in csv.DictReader(file, delimiter="\t") if row["file"] == name)
+    row = row_of(folder, name)
     side = row["suggested_view_from"].split()[0]  # "z+", or "z+ (3/4 better)"
     front = np.array(AXES[side[0]]) * (-1 if side[1] == "-" else 1)
     mesh = rel.read_mesh(folder / name)

@@ -35,6 +35,9 @@ _EMPTY = 1e-3
 """Stiffness of the springs across gaps in bounded mode: empty space gives depth away for nothing, the springs
 only settle what nothing else does."""
 
+_PULLED, _PAIRED = 0.1, 0.2
+"""Shares of the work after which it is known what the views from the side ask for, and what is stacked."""
+
 
 def bounded_step(
     vertices: NDArray[np.float64],
@@ -47,6 +50,7 @@ def bounded_step(
 ) -> BoundedStage:
     """Find the closest relief of the wanted depth."""
     z, n = vertices[:, 2], len(vertices)
+    tick(0.0)
     face, share = seen_points(vertices, faces)
     in_front = seen_faces(faces, visible, face)
     kept = _kept_shape(scene, params)[faces].mean(axis=1)
@@ -65,23 +69,26 @@ def bounded_step(
     form, slivers = cotangent_laplacian(vertices, faces, weights=weight)
     middle = (float(z.max()) + lowest) / 2.0
     pull = side_pull(vertices, faces, middle + (z - middle) * (depth / deep), in_front, kept)
+    tick(_PULLED)
     lines = Lines(vertices, faces)
     stacked = vertex_pairs(lines)
     ties = tie_parts(
         vertices, faces, form, np.arange(n), stacked, stacked.gap * (depth / deep), across_gaps=_EMPTY
     )
+    pairs = _stacked(vertices, faces, lines, stacked, params)
+    tick(_PAIRED)
     found = closest_relief(
         vertices,
         faces,
         form if ties is None else form + ties.among_held,
         depth,
-        _stacked(vertices, faces, lines, stacked, params),
+        pairs,
         seen,
         visible,
         pull=pull if ties is None else pull + ties.among_held_pull,
         min_gap=params.min_gap / scene.unit,
         attach=attached,
-        tick=tick,
+        tick=lambda share: tick(None if share is None else _PAIRED + (1.0 - _PAIRED) * share),
     )
     counts = {
         "already_shallower": 0,

@@ -100,7 +100,7 @@ class Certificate:
             )
         if self.bend_near_points > self.bend_elsewhere:
             found.append(
-                f"Faces near attenuation points are bent by {self.bend_near_points:.0f} degrees (99th "
+                f"Faces near points that are held are bent by {self.bend_near_points:.0f} degrees (99th "
                 f"percentile), more than the {self.bend_elsewhere:.0f} elsewhere."
             )
         return found

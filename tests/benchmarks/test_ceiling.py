@@ -35,6 +35,12 @@ def test_what_is_behind_the_plane_is_not_seen(scene):
     assert not ceiling.in_front(body, (20.0, 0.0), reach, 32).hit.any()
 
 
+def test_a_folder_without_a_manifest_is_named(monkeypatch, tmp_path):
+    monkeypatch.setattr(sys, "argv", ["ceiling.py", str(tmp_path)])
+    with pytest.raises(SystemExit, match=r"MANIFEST\.tsv does not exist"):
+        ceiling.main()
+
+
 def test_table_has_a_row_for_each_mesh_and_depth(monkeypatch, capsys, scene, tmp_path):
     monkeypatch.setattr(ceiling, "read_scene", lambda folder, name: scene)
     monkeypatch.setattr(sys, "argv", ["ceiling.py", str(tmp_path), "--meshes", "bust.ply", "--size", "32"])
