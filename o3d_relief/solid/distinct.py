@@ -6,6 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from o3d_relief.errors import MeshError
 from o3d_relief.solid.body import Solid
@@ -14,12 +17,17 @@ __all__ = ["distinct"]
 
 _STEPS = 8.0
 """By how many steps of float32 vertices at one place are moved, at first."""
+
+_ONE_PLACE_MM = 1e-7
+"""Vertices that are closer are at one place: near zero float32 tells 1e-10 mm from none, but programs that
+join vertices do not."""
+
 _FARTHEST_MM = 0.005
 """Farther than this nothing is moved."""
 
 
 def distinct(solid: Solid) -> Solid:
-    """Return the solid with no two vertices at one place, measured in float32.
+    """Return the solid with no two vertices at one place, measured in float32 and to 1e-7 mm.
 
     Most programs read a file by position. Where parts of a solid touch in an edge, they would find edges
     with four faces, and start to repair. Vertices that lie at one place are moved towards the mean of their
@@ -75,16 +83,19 @@ def distinct(solid: Solid) -> Solid:
 
 def _crowded(vertices: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the vertices (c,) that share their place, in float32, with others, and their ranks."""
-    rounded = vertices.astype(np.float32) + np.float32(0.0)  # one zero only
-    keys = np.ascontiguousarray(rounded).view(np.dtype((np.void, 12))).ravel()
-    places = np.unique(keys, return_inverse=True)[1].ravel()
-    crowded = np.flatnonzero(np.bincount(places)[places] > 1)
-    order = np.argsort(places[crowded], kind="stable")
-    ordered = places[crowded][order]
-    starts = np.searchsorted(ordered, ordered)
+    rounded = vertices.astype(np.float32).astype(np.float64)
+    pairs = cKDTree(rounded).query_pairs(_ONE_PLACE_MM, output_type="ndarray")
+    if len(pairs) == 0:
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    crowded, ends = np.unique(pairs, return_inverse=True)
+    one, other = ends.reshape(pairs.shape).T
+    graph = coo_array((np.ones(len(one)), (one, other)), shape=(len(crowded), len(crowded)))
+    places = connected_components(graph, directed=False)[1]
+    order = np.argsort(places, kind="stable")
+    ordered = places[order]
     rank = np.zeros(len(crowded), dtype=np.int64)
-    rank[order] = np.arange(len(crowded)) - starts
-    return crowded, rank
+    rank[order] = np.arange(len(crowded)) - np.searchsorted(ordered, ordered)
+    return crowded.astype(np.int64), rank
 
 
 def _to_neighbours(

@@ -68,3 +68,16 @@ def test_detail_that_float32_cannot_hold_is_an_error():
 def test_solids_without_such_vertices_stay_as_they_are():
     solid = ball_on_slab()
     assert distinct(solid) is solid
+
+
+def test_vertices_near_zero_that_only_float32_tells_apart_are_moved():
+    # The ends of two spikes meet at the height of zero, but for less than programs tell apart.
+    up = manifold3d.Manifold.cylinder(5.0, 0.0, 3.0, 4).translate([0.0, 0.0, 1e-9])
+    down = manifold3d.Manifold.cylinder(5.0, 3.0, 0.0, 4).translate([0.0, 0.0, -5.0])
+    solid = Solid.from_manifold(plain(up) + plain(down), colored=False)
+    tips = np.abs(solid.vertices).max(axis=1) < 1e-6
+    assert tips.sum() == 2
+    assert len(np.unique(solid.vertices[tips].astype(np.float32), axis=0)) == 2
+    apart = distinct(solid)
+    gaps = np.linalg.norm(apart.vertices[tips][0] - apart.vertices[tips][1])
+    assert 1e-6 < gaps < 0.001
