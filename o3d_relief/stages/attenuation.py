@@ -9,9 +9,9 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
-from threadpoolctl import threadpool_limits
 
 from o3d_relief.errors import SolverError
+from o3d_relief.linalg.one_thread import one_thread
 from o3d_relief.linalg.solve import solve_direct
 
 __all__ = [
@@ -296,7 +296,7 @@ def _bounded_least_squares(
         return result
     columns = laplacian[:, free]
     normal = (columns.T @ columns + sp.diags_array(attached[free].astype(float))).tocsr()
-    with threadpool_limits(limits=1):
+    with one_thread():
         result[free] = _bounded_minimum(normal, columns.T @ wanted, height[free])
     return result
 

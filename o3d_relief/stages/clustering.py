@@ -50,7 +50,8 @@ def cluster_vertices(
     """
     samples, weights = _samples(xy, k)
     kmeans = KMeans(n_clusters=min(k, _distinct(samples)), n_init=1, random_state=seed)
-    # The order in which threads add up their partial means would change the last digits.
+    # The order in which threads add up their partial means would change the last digits. This is about all
+    # threads, those of scikit-learn as well, not only the linear algebra's.
     with threadpool_limits(limits=1):
         kmeans.fit(samples, sample_weight=weights)
     centers = np.asarray(kmeans.cluster_centers_, dtype=np.float64)
