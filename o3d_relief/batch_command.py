@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from o3d_relief.batch_manifest import MANIFEST
-from o3d_relief.console import tell
+from o3d_relief.console import tell, tell_unused
 from o3d_relief.relief_arguments import chosen_params, chosen_view
 from o3d_relief.scan_arguments import chosen_scan
 
@@ -34,6 +34,7 @@ def batch(options: argparse.Namespace) -> int:
         Anything that the user can mend.
     """
     params, view, scan = chosen_params(options), chosen_view(options), chosen_scan(options)
+    tell_unused(params)
 
     from o3d_relief.batch import make_reliefs
     from o3d_relief.progress_bar import BatchBar

@@ -29,12 +29,15 @@ def find_inputs(inputs: Sequence[str | Path]) -> list[str]:
     ParameterError
         No inputs, or one path in place of several.
     FileError
-        A folder without any file that can be read.
+        A folder without any file that can be read, or inputs of which none is there.
     """
     from o3d_relief.scene.read import READABLE, READABLE_CLOUDS
 
     if isinstance(inputs, str | Path) or len(inputs) == 0:
         raise ParameterError(f"inputs must be a sequence of files, at least one. Got {inputs!r} instead.")
+    if not any(Path(place).exists() for place in inputs):
+        rest = "" if len(inputs) == 1 else f", nor any of the {len(inputs) - 1} others"
+        raise FileError(f"There is no file or folder {inputs[0]}{rest}: check the name.")
     found: list[Path] = []
     for place in map(Path, inputs):
         if not place.is_dir():

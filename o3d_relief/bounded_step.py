@@ -60,12 +60,12 @@ def bounded_step(
     partly = ~visible[faces[face]].all(axis=1)
     seen = point_rows(faces, face[partly], share[partly], n)
     lowest = lowest_seen(z, seen, visible)
-    depth = _wanted_depth(scene, params)
     deep = float(z.max()) - lowest
-    if deep <= depth:
+    if deep <= cast(float, params.depth) / scene.unit:
         shallow = {"already_shallower": 1, "attached_missed": int((z[attached] > lowest).sum())}
         return BoundedStage(face_weight=weight, attached=attached, z=on_plane(z - lowest), counts=shallow)
 
+    depth = _wanted_depth(scene, params)
     form, slivers = cotangent_laplacian(vertices, faces, weights=weight)
     middle = (float(z.max()) + lowest) / 2.0
     pull = side_pull(vertices, faces, middle + (z - middle) * (depth / deep), in_front, kept)

@@ -11,13 +11,15 @@ from typing import TYPE_CHECKING
 
 from o3d_relief.errors import FileError
 from o3d_relief.files import write_bytes
+from o3d_relief.option_words import as_options
 
 if TYPE_CHECKING:
     from o3d_relief.making import Made
+    from o3d_relief.params import ReliefParams
     from o3d_relief.records import StageRecord
     from o3d_relief.relief import Relief
 
-__all__ = ["make_folder", "tell", "tell_result", "tell_stage", "write_report", "write_stages"]
+__all__ = ["make_folder", "tell", "tell_result", "tell_stage", "tell_unused", "write_report", "write_stages"]
 
 
 _LOOSE = 0.1
@@ -38,6 +40,13 @@ def tell_stage(record: StageRecord) -> None:
     """Write a line about a stage."""
     counts = ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in record.counts.items() if count)
     tell(f"  {record.name:<13}{record.seconds:6.2f} s  {counts}".rstrip())
+
+
+def tell_unused(params: ReliefParams) -> None:
+    """Write a line about parameters that were given for nothing."""
+    if params.unused:
+        names = ", ".join(as_options(name, params.unused) for name in params.unused)
+        tell(f"without effect, for the bounded mode has no attenuation points: {names}")
 
 
 def make_folder(folder: Path) -> None:

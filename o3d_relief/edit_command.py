@@ -61,11 +61,12 @@ def edit(options: argparse.Namespace) -> int:
 
 def _words(params: ReliefParams, eye: View) -> str:
     """Name what counts in the mode that was chosen last."""
+    depth = params.depth if params.depth is None or isinstance(params.depth, str) else f"{params.depth:g}"
     if params.depth is not None and params.bounded:
-        words = f"the closest relief of depth {params.depth:g}"
+        words = f"the closest relief of depth {depth}"
     else:
         edits = len(params.point_edits)
         points = "1 point" if edits == 1 else f"{edits} points"
-        squeezed = f"alpha {params.alpha}" if params.depth is None else f"depth {params.depth:g}"
+        squeezed = f"alpha {params.alpha}" if params.depth is None else f"depth {depth}"
         words = f"k {params.k}, beta {params.beta}, {squeezed}, {points} edited by hand"
     return words if eye.vanishing_point is None else f"{words}, vanishing point {eye.vanishing_point}"

@@ -181,6 +181,11 @@ class ReliefEditor:
         return self._scene.scene.unit
 
     @property
+    def visible_depth(self) -> float:
+        """Depth of what is visible of the scene, in the input's unit."""
+        return self._scene.visible_depth
+
+    @property
     def to_scene(self) -> NDArray[np.float64]:
         """(4, 4) float64: takes the relief frame to the input's frame."""
         return self._scene.frame.to_scene

@@ -32,6 +32,7 @@ from o3d_relief.steps import (
     perspective_step,
     scene_step,
     visibility_step,
+    visible_depth,
 )
 
 __all__ = ["LivePoints", "LiveScene"]
@@ -83,6 +84,15 @@ class LiveScene:
         lines = Lines(self.vertices, faces, UnitBox(self.vertices, faces))
         return find_springs(self.vertices, faces, self.laplacian, vertex_pairs(lines))
 
+    @property
+    def visible_depth(self) -> float:
+        """Depth of what is visible, in the input's unit."""
+        return visible_depth(self.vertices, self.visible) * self.scene.unit
+
+    def settled(self, params: ReliefParams) -> ReliefParams:
+        """Return the parameters with a length for a depth that is a share."""
+        return params.settled(self.visible_depth)
+
     def scaled(self, params: ReliefParams) -> NDArray[np.float64]:
         """Scale the scene linearly to the depth of the bounded mode, what is visible in front of S.
 
@@ -92,7 +102,7 @@ class LiveScene:
             Heights in relief units.
         """
         z = self.vertices[:, 2] - self.vertices[self.visible, 2].min()
-        depth = cast(float, params.depth) / self.scene.unit
+        depth = cast(float, self.settled(params).depth) / self.scene.unit
         return np.asarray(z * min(1.0, depth / z.max()) if z.max() > 0.0 else z)
 
 
@@ -162,4 +172,4 @@ class LivePoints:
             beta = beta_of_clusters(points, len(self._clusters.centers))
             shrink = attenuate(stacked.gap, beta[self._clusters.labels[stacked.upper[:, 0]]])
         z = self._construction.heights(points.action != "discard", points.new_height, shrink)
-        return points, np.array(compression_step(z, params, scene.scene.unit).z)
+        return points, np.array(compression_step(z, scene.settled(params), scene.scene.unit).z)

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from o3d_relief.console import tell, tell_result, tell_stage, write_report, write_stages
+from o3d_relief.console import tell, tell_result, tell_stage, tell_unused, write_report, write_stages
 from o3d_relief.errors import FileError, MeshError, ParameterError, ReliefError
 from o3d_relief.files import check_exists, check_place
 from o3d_relief.plate_arguments import chosen_plate
@@ -50,6 +50,7 @@ def make(options: argparse.Namespace) -> int:
     check_workshop(plate, mill, tiles)
     check_exists(options.input)
     taken = _check_places(options)
+    tell_unused(params)
 
     from o3d_relief.making import make_checked, tell_estimate
     from o3d_relief.pipeline import make_relief

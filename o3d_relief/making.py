@@ -118,6 +118,7 @@ def tell_estimate(
     """
     found = estimate_solid(mesh, params, view, plate)
     x, y, z = found.size_mm
+    tell(f"seen      {found.visible_depth:.4g} deep, in the unit of the file: 100% of --depth")
     depth = f"{z:.2f}" if found.depth_known else f"at most {z:.2f}"
     tell(f"size      {x:.2f} x {y:.2f} x {depth} mm")
     tell(f"volume    {'about' if found.depth_known else 'at most'} {found.volume_mm3 / 1000.0:.0f} cm3")

@@ -11,6 +11,7 @@ from o3d_relief.errors import ParameterError
 __all__ = [
     "Triple",
     "check_beta",
+    "check_depth",
     "check_direction",
     "check_indices",
     "check_integer",
@@ -36,6 +37,25 @@ def check_number(name: str, value: object) -> float:
     if not math.isfinite(number):
         raise ParameterError(f"{name} must be finite. Got {value!r} instead.")
     return number
+
+
+def check_depth(name: str, value: object) -> float | str:
+    """Return a length greater than 0 as a float, or a share such as '25%' without spaces."""
+    if not isinstance(value, str):
+        number = check_number(name, value)
+        if number <= 0.0:
+            raise ParameterError(f"{name} must be greater than 0. Got {value!r} instead.")
+        return number
+    try:
+        share = float(value.strip().removesuffix("%")) if value.strip().endswith("%") else math.nan
+    except ValueError:
+        share = math.nan
+    if not 0.0 < share <= 100.0:
+        raise ParameterError(
+            f"{name} must be a length, or a share of the scene's depth up to 100%, as '25%'. "
+            f"Got {value!r} instead."
+        )
+    return f"{share!r}%".replace(".0%", "%")
 
 
 def check_range(name: str, value: object, low: float, high: float = math.inf) -> float:

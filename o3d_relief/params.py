@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from o3d_relief.errors import ParameterError
 from o3d_relief.param_checks import (
     Triple,
     check_beta,
+    check_depth,
     check_direction,
     check_indices,
     check_integer,
@@ -96,6 +98,12 @@ _PAPER: dict[str, Any] = {
 }
 
 
+_OF_POINTS = (
+    "k", "beta", "discard_above", "attach_below", "max_order_error", "blend", "smooth_points", "point_edits",
+)  # fmt: skip
+"""The parameters that concern the attenuation points."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class ReliefParams:
     """The parameters of the method.
@@ -125,9 +133,10 @@ class ReliefParams:
         The paper's alpha, the largest compression ratio, in (0, 1]. None: no compression.
     alpha_min : float, optional
         The smallest compression ratio, in (0, alpha]. None: half of the largest.
-    depth : float, optional
-        Wanted depth of the relief above the plane, in the input's unit, met exactly. A scene, or a relief
-        before its compression, that is shallower already is left as it is. Excludes `alpha`.
+    depth : float or "25%", ..., optional
+        Wanted depth of the relief above the plane, met exactly: in the input's unit, or as a share of the
+        depth of what is visible of the scene. A scene, or a relief before its compression, that is
+        shallower already is left as it is. Excludes `alpha`.
     smooth_points : bool
         Also restore a disc around every kept attenuation point, which removes the small pimples that
         the paper's own rule (False) leaves there.
@@ -161,6 +170,8 @@ class ReliefParams:
     --------
     >>> ReliefParams(k=64, depth=12).depth
     12.0
+    >>> ReliefParams(depth="25%").bounded
+    True
     """
 
     mode: str | None = None
@@ -172,7 +183,7 @@ class ReliefParams:
     blend: float = 0.9
     alpha: float | None = None
     alpha_min: float | None = None
-    depth: float | None = None
+    depth: float | str | None = None
     smooth_points: bool = True
     in_front: bool = True
     in_order: bool = True
@@ -225,6 +236,38 @@ class ReliefParams:
         """Whether the relief is made by the bounded mode."""
         return self.mode == "bounded" or (self.mode is None and self.depth is not None)
 
+    @property
+    def unused(self) -> tuple[str, ...]:
+        """The parameters that are not at their defaults, but without effect in this mode.
+
+        Examples
+        --------
+        >>> ReliefParams(depth=3, k=64).unused
+        ('k',)
+        """
+        if not self.bounded:
+            return ()
+        default = type(self)()
+        return tuple(name for name in _OF_POINTS if getattr(self, name) != getattr(default, name))
+
+    def settled(self, visible_depth: float) -> ReliefParams:
+        """Return the same parameters with a length for a depth that is a share.
+
+        Parameters
+        ----------
+        visible_depth : float
+            Depth of what is visible of the scene, in the input's unit.
+
+        Examples
+        --------
+        >>> ReliefParams(depth="25%").settled(12.0).depth
+        3.0
+        """
+        if not isinstance(self.depth, str):
+            return self
+        depth = float(self.depth.removesuffix("%")) / 100.0 * visible_depth
+        return replace(self, depth=max(depth, sys.float_info.min))  # a flat scene stays as it is
+
     def _check_mode(self) -> None:
         if self.mode not in (None, "attenuation", "bounded"):
             raise ParameterError(f'mode must be "attenuation" or "bounded". Got {self.mode!r} instead.')
@@ -247,14 +290,15 @@ class ReliefParams:
     def _check_compression(self) -> None:
         if self.alpha is not None and self.depth is not None:
             raise ParameterError("alpha and depth exclude each other: give one of them.")
-        for name in ("alpha", "alpha_min", "depth"):
+        if self.depth is not None:
+            object.__setattr__(self, "depth", check_depth("depth", self.depth))
+        for name in ("alpha", "alpha_min"):
             value = getattr(self, name)
             if value is None:
                 continue
             number = check_number(name, value)
-            if number <= 0.0 or (name != "depth" and number > 1.0):
-                wanted = "greater than 0" if name == "depth" else "greater than 0 and at most 1"
-                raise ParameterError(f"{name} must be {wanted}. Got {value!r} instead.")
+            if not 0.0 < number <= 1.0:
+                raise ParameterError(f"{name} must be greater than 0 and at most 1. Got {value!r} instead.")
             object.__setattr__(self, name, number)
         if self.alpha_min is not None and self.alpha_min > (1.0 if self.alpha is None else self.alpha):
             raise ParameterError(

@@ -39,6 +39,7 @@ from o3d_relief.steps import (
     trim_step,
     turned_to_viewer,
     visibility_step,
+    visible_depth,
 )
 
 __all__ = ["make_relief"]
@@ -125,13 +126,14 @@ def make_relief(
     # Who keeps the order casts more rays through the scene.
     box = UnitBox(vertices, faces) if params.in_order and not params.bounded else None
     visible = journal.keep(visibility_step(vertices, faces, view, box)).visible
+    settled = params.settled(visible_depth(vertices, visible) * scene.unit)
     journal.begin("bounded" if params.bounded else "clusters")
     laplacian, slivers = cotangent_laplacian(vertices, faces)
     if params.bounded:
-        z = journal.keep(bounded_step(vertices, faces, visible, scene, params, tick=journal.tick)).z
+        z = journal.keep(bounded_step(vertices, faces, visible, scene, settled, tick=journal.tick)).z
     else:
         z = _attenuated(
-            vertices, visible, laplacian, slivers, scene, Lines(vertices, faces, box), params, journal
+            vertices, visible, laplacian, slivers, scene, Lines(vertices, faces, box), settled, journal
         )
     del box  # it takes much of the memory, and no more rays are cast through it
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -24,6 +25,11 @@ def on_terminal() -> bool:
     bool
     """
     return sys.stderr is not None and sys.stderr.isatty()
+
+
+def _columns() -> int:
+    """Return the width of the terminal; of one that says that it has none, the usual one."""
+    return shutil.get_terminal_size().columns
 
 
 class StageBar:
@@ -57,6 +63,7 @@ class StageBar:
                 desc=stage,
                 bar_format=_WITHOUT,
                 file=sys.stderr,
+                ncols=_columns(),
                 leave=False,
                 mininterval=0.2,
                 miniters=0,
@@ -114,7 +121,13 @@ class BatchBar:
         if self._bar is None:
             # What was done before says nothing about the time that the rest will take.
             self._bar = tqdm(
-                total=1.0, initial=share, bar_format=_MANY, file=sys.stderr, leave=False, miniters=0
+                total=1.0,
+                initial=share,
+                bar_format=_MANY,
+                file=sys.stderr,
+                ncols=_columns(),
+                leave=False,
+                miniters=0,
             )
         self._bar.update(share - self._bar.n)
 

@@ -60,6 +60,14 @@ def _beta(text: str) -> float | tuple[float, ...]:
     return numbers[0] if len(numbers) == 1 else numbers
 
 
+def _depth(text: str) -> float | str:
+    """Read a length; what is none is a share, or what the parameters refuse."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
 def add_view(command: argparse.ArgumentParser) -> None:
     """Add the options of the view.
 
@@ -122,7 +130,8 @@ def add_params(command: argparse.ArgumentParser) -> None:
         help="smallest gap in depth between parts, in the input's unit (default: %(default)s)")  # fmt: skip
     add("--alpha", type=float, metavar="A", help="largest compression ratio (default: no compression)")
     add("--alpha-min", type=float, metavar="A", help="smallest compression ratio (default: half of alpha)")
-    add("--depth", type=float, metavar="D", help="exact depth in the input's unit")
+    add("--depth", type=_depth, metavar="D",
+        help="exact depth, in the input's unit or as a share of the depth that is seen, as 25%%")  # fmt: skip
     add("--attach", type=_integers, default=(), metavar="N[,N...]",
         help="vertices to hold on the plane, bounded mode only")  # fmt: skip
     add("--seed", type=int, default=default.seed, metavar="N", help="default: %(default)s")

@@ -117,6 +117,11 @@ def visibility_step(
     return VisibilityStage(visible=visible, counts={"visible": int(visible.sum())})
 
 
+def visible_depth(vertices: NDArray[np.float64], visible: NDArray[np.bool_]) -> float:
+    """Return the depth of what is visible."""
+    return float(np.ptp(vertices[visible, 2]))
+
+
 def clusters_step(vertices: NDArray[np.float64], params: ReliefParams) -> ClustersStage:
     """Partition the vertices on x and y."""
     labels, centers = cluster_vertices(vertices[:, :2], params.k, seed=params.seed)
@@ -188,7 +193,7 @@ def ratios(z: NDArray[np.float64], params: ReliefParams, unit: float) -> tuple[f
     """Return the largest and the smallest compression ratio, 1 and 1 for no compression."""
     alpha, lowest = params.alpha, params.alpha_min
     if params.depth is not None:
-        alpha = alpha_for_depth(z, params.depth / unit)
+        alpha = alpha_for_depth(z, cast(float, params.depth) / unit)
         if alpha == 1.0:
             return 1.0, 1.0  # what is shallow enough already is left alone
         return alpha, alpha / 2.0 if lowest is None else min(lowest, alpha)

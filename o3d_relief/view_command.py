@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from o3d_relief.console import tell, tell_stage
+from o3d_relief.console import tell, tell_stage, tell_unused
 from o3d_relief.errors import Cancelled, MeshError
 from o3d_relief.files import check_exists
 from o3d_relief.make_command import read_scene
@@ -38,6 +38,7 @@ def view(options: argparse.Namespace) -> int:
     """
     params, eye, scan = chosen_params(options), chosen_view(options), chosen_scan(options)
     check_exists(options.input)
+    tell_unused(params)
     require_display()
 
     from o3d_relief.pipeline import make_relief

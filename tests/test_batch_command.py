@@ -73,11 +73,26 @@ def test_every_option_arrives(tmp_path, monkeypatch):
     ],
 )
 def test_wrong_options(tmp_path, capsys, words, sentence):
+    (tmp_path / "a.ply").touch()
     assert main(["batch", str(tmp_path / "a.ply"), "--out", str(tmp_path / "out"), *words]) == 2
     assert sentence in capsys.readouterr().err
 
 
 def test_a_folder_that_cannot_be_made(tmp_path, capsys):
-    (tmp_path / "out").touch()
+    for name in ("a.ply", "out"):
+        (tmp_path / name).touch()
     assert main(["batch", str(tmp_path / "a.ply"), "--out", str(tmp_path / "out")]) == 2
     assert "The folder" in capsys.readouterr().err
+
+
+def test_inputs_that_are_not_there_leave_no_folder(tmp_path, capsys):
+    assert main(["batch", str(tmp_path / "scans"), "--out", str(tmp_path / "out")]) == 2
+    assert "scans: check the name" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_parameters_without_effect_are_named(monkeypatch, capsys):
+    code, asked = _run(monkeypatch, [MADE], "--depth", "25%", "-k", "9")
+    assert code == 0
+    assert asked["params"] == rel.ReliefParams(k=9, depth="25%")
+    assert "no attenuation points: -k" in capsys.readouterr().err

@@ -211,6 +211,20 @@ def test_a_depth_alone_means_the_bounded_mode(tmp_path, scene, capsys):
     assert "less than was asked for" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("mode", ["bounded", "attenuation"])
+def test_a_depth_as_a_share(tmp_path, scene, capsys, mode):
+    report, out = tmp_path / "report.json", tmp_path / "relief.ply"
+    words = ["make", str(scene), str(out), "--depth", "20%", "--mode", mode, "-k", "30"]
+    assert main([*words, "--report", str(report)]) == 0
+    values = json.loads(report.read_text())
+    assert values["params"]["depth"] == "20%"
+    assert values["relief_depth"] == pytest.approx(0.2 * values["scene_visible_depth"])
+    assert ("without effect" in capsys.readouterr().err) == (mode == "bounded")
+    assert main([*words, "--dry-run"]) == 0
+    assert f"seen      {values['scene_visible_depth']:.4g} deep" in capsys.readouterr().err
+    assert "--depth must be a length, or a share" in _fails(capsys, *words[:-4], "--depth", "20 mm")
+
+
 def test_deeper_than_it_is(tmp_path, scene, capsys):
     assert (
         main(

@@ -225,6 +225,12 @@ def test_bounded_mode_has_a_preview_and_no_points(mesh, editor):
         editor.edit(0, action="attach")
     assert editor.undo()
     assert editor.points.edited.sum() == 1
+    editor.change(depth="25%")
+    assert editor.params.depth == "25%"
+    assert editor.visible_depth < np.ptp(editor.scene_vertices[:, 2])
+    assert editor.vertices[:, 2].max() == pytest.approx(0.25 * editor.visible_depth)
+    editor.change(mode="attenuation")
+    assert editor.vertices[:, 2].max() == pytest.approx(0.25 * editor.visible_depth)
     first = ReliefEditor(mesh, ReliefParams(depth=1e6))
     assert np.ptp(first.heights) == pytest.approx(np.ptp(first.scene_vertices[:, 2]) / first.unit)
     first.change(depth=None, k=K)

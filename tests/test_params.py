@@ -24,6 +24,10 @@ from o3d_relief import ParameterError, ReliefParams, View
         ({"alpha": 0.4, "alpha_min": 0.5}, "alpha_min must not exceed alpha"),
         ({"alpha": 0.4, "depth": 3}, "exclude each other"),
         ({"depth": 0}, "depth must be greater than 0"),
+        ({"depth": "0%"}, "depth must be a length, or a share of the scene's depth up to 100%"),
+        ({"depth": "101%"}, "depth must be a length, or a share"),
+        ({"depth": "nan%"}, "depth must be a length, or a share"),
+        ({"depth": "12"}, "depth must be a length, or a share"),
         ({"depth": float("inf")}, "depth must be finite"),
         ({"smooth_points": 1}, "smooth_points must be True or False"),
         ({"k": 10**400}, "k must be a number"),
@@ -93,6 +97,22 @@ def test_a_depth_chooses_the_mode():
     assert not ReliefParams(depth=3, mode="attenuation").bounded
     assert not ReliefParams.paper(depth=3).bounded
     assert ReliefParams(depth=3, attach=np.array([4, 2])).attach == (4, 2)
+
+
+def test_a_depth_can_be_a_share():
+    params = ReliefParams(depth=" 12.50 %", k=64)
+    assert params.depth == "12.5%"
+    assert params.bounded
+    assert params.settled(80.0) == ReliefParams(depth=10.0, k=64)
+    assert ReliefParams(depth=10.0).settled(80.0) == ReliefParams(depth=10.0)
+    assert 0.0 < params.settled(0.0).depth < 1e-300  # a flat scene is left as it is
+    assert ReliefParams(depth="100%").settled(3.0).depth == 3.0
+
+
+def test_what_has_no_effect():
+    assert ReliefParams(k=5, beta=0.1).unused == ()
+    assert ReliefParams(depth=3).unused == ()
+    assert ReliefParams(depth=3, beta=0.1, smooth_points=False, seed=4).unused == ("beta", "smooth_points")
 
 
 def test_parameters_cannot_be_changed():

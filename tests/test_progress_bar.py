@@ -1,4 +1,5 @@
 import io
+import os
 import sys
 
 import pytest
@@ -42,6 +43,16 @@ def test_the_share_is_drawn(monkeypatch):
     assert "trim" in terminal.getvalue().split("\r")[-1]
     bar.close()
     assert terminal.getvalue().split("\r")[-1].strip() == ""
+
+
+def test_a_terminal_that_says_it_has_no_width(monkeypatch):
+    terminal = watched(monkeypatch)
+    monkeypatch.setattr("os.get_terminal_size", lambda *_: os.terminal_size((0, 0)))
+    monkeypatch.delenv("COLUMNS", raising=False)
+    bar = StageBar()
+    bar("order", 0.5)
+    bar.close()
+    assert "order" in terminal.getvalue()
 
 
 def test_elsewhere_there_is_none(monkeypatch):

@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from open3d.visualization import gui
 
@@ -201,7 +201,7 @@ class EditorPanel:
         column.set("attach_below", params.attach_below)
         self._mode.selected_index = list(MODES).index(mode_of(params))
         deepest = self._scale.to_mm(sight.scene_depth)
-        depth = deepest if params.depth is None else self._scale.to_mm(params.depth)
+        depth = deepest if params.depth is None else self._scale.to_mm(cast(float, params.depth))
         column.set("depth", depth, (0.01 * deepest, max(deepest, depth)))
         self._enable(params)
         point = sight.view.vanishing_point

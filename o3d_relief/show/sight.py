@@ -24,6 +24,7 @@ class Sight:
     faces : (m, 3) int64
     points : EditorPoints
     params : ReliefParams
+        Their depth a length.
     view : View
     unit : float
         Length of one relief unit in the input's unit.
@@ -64,7 +65,7 @@ class Sight:
             vertices=vertices,
             faces=editor.faces,
             points=points,
-            params=editor.params,
+            params=editor.params.settled(editor.visible_depth),
             view=editor.view,
             unit=editor.unit,
             scene_depth=float(np.ptp(editor.scene_vertices[:, 2])),

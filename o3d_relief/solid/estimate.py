@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 import open3d as o3d
@@ -14,7 +15,7 @@ from o3d_relief.rays import unit_box
 from o3d_relief.scene.convert import mesh_arrays
 from o3d_relief.scene.frame import to_relief_units
 from o3d_relief.solid.sizes import scale_for
-from o3d_relief.steps import frame_step, perspective_step
+from o3d_relief.steps import frame_step, perspective_step, visibility_step, visible_depth
 
 __all__ = ["Estimate", "estimate_solid", "relief_depth"]
 
@@ -35,6 +36,8 @@ class Estimate:
     size_mm : (x, y, z)
         Width and height; x, and z where a depth was asked for, are what the solid will measure. The
         rest can be smaller: parts that end behind the relief plane are cut off.
+    visible_depth : float
+        Depth of what is visible of the scene, in the input's unit.
     depth_known : bool
         False where no depth was asked for; z is then that of the scene, the most that it can be.
     volume_mm3 : float
@@ -46,6 +49,7 @@ class Estimate:
     """
 
     size_mm: tuple[float, float, float]
+    visible_depth: float
     depth_known: bool
     volume_mm3: float
     triangles: int
@@ -77,11 +81,13 @@ def estimate_solid(
     used = vertices[np.unique(faces)]
     scale = scale_for(used[:, :2], plate)
     width, height, scene_depth = np.ptp(used, axis=0) * scale
+    seen_depth = visible_depth(vertices, visibility_step(vertices, faces, view).visible) * unit
+    wanted_depth = params.settled(seen_depth).depth
     depth, known = scene_depth, False
     if plate.depth_mm is not None:
         depth, known = plate.depth_mm - plate.back_mm, True
-    elif params.depth is not None:
-        wanted = params.depth / unit * scale
+    elif wanted_depth is not None:
+        wanted = cast(float, wanted_depth) / unit * scale
         depth, known = min(depth, wanted), wanted <= depth
     covered, mean_height = _front(vertices, faces)
     total_height = (plate.width_mm - 2.0 * plate.edge_mm) * height / width + 2.0 * plate.edge_mm
@@ -90,6 +96,7 @@ def estimate_solid(
     volume += width * height * covered * mean_height * depth * (_BOUNDED if params.bounded else _ATTENUATED)
     return Estimate(
         size_mm=(plate.width_mm, float(total_height), float(depth + plate.back_mm)),
+        visible_depth=seen_depth,
         depth_known=known,
         volume_mm3=float(volume),
         triangles=len(faces),

@@ -35,3 +35,7 @@ def test_without_a_depth_it_is_at_most_that_of_the_scene(scene):
     given = estimate_solid(scene, rel.ReliefParams(depth=width / 10), rel.View(), PlateParams(shape="none"))
     assert given.depth_known
     assert given.size_mm[2] == pytest.approx(15.0)
+    share = estimate_solid(scene, rel.ReliefParams(depth="20%"), rel.View(), PlateParams(shape="none"))
+    made = rel.make_relief(scene, rel.ReliefParams(depth="20%"))
+    assert share.visible_depth == pytest.approx(made.summary()["scene_visible_depth"])
+    assert share.size_mm[2] == pytest.approx(made.summary()["relief_depth"] / width * 150.0)
