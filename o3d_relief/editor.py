@@ -12,6 +12,7 @@ import open3d as o3d
 from numpy.typing import NDArray
 
 from o3d_relief.errors import MeshError, ParameterError
+from o3d_relief.history import History
 from o3d_relief.journal import OnStage
 from o3d_relief.live_scene import LivePoints, LiveScene
 from o3d_relief.params import ReliefParams, View
@@ -116,8 +117,7 @@ class ReliefEditor:
                 raise ParameterError(f"{name} must be a {kind.__name__}. Got {value!r} instead.")
         self._mesh = o3d.geometry.TriangleMesh(mesh)
         self._first = params, view
-        self._before: list[tuple[ReliefParams, View]] = []
-        self._after: list[tuple[ReliefParams, View]] = []
+        self._history: History[tuple[ReliefParams, View]] = History()
         self._progress = Progress(on_progress)
         self._scene = LiveScene(self._mesh, params, view, self._progress)
         self._live: LivePoints | None = None
@@ -303,9 +303,7 @@ class ReliefEditor:
     def _go(self, params: ReliefParams, view: View, continued: bool = False) -> None:
         now = self._params, self.view
         self._show(params, view)
-        if not (continued and self._before):
-            self._before.append(now)
-        self._after.clear()
+        self._history.keep(now, continued=continued)
 
     def undo(self) -> bool:
         """Take the last change back.
@@ -315,7 +313,7 @@ class ReliefEditor:
         bool
             False where there is none.
         """
-        return self._back(self._before, self._after)
+        return self._history.undo((self._params, self.view), self._show_both)
 
     def redo(self) -> bool:
         """Make the change that was taken back last again.
@@ -325,16 +323,10 @@ class ReliefEditor:
         bool
             False where there is none.
         """
-        return self._back(self._after, self._before)
+        return self._history.redo((self._params, self.view), self._show_both)
 
-    def _back(self, source: list[tuple[ReliefParams, View]], target: list[tuple[ReliefParams, View]]) -> bool:
-        if not source:
-            return False
-        now = self._params, self.view
-        self._show(*source[-1])
-        source.pop()
-        target.append(now)
-        return True
+    def _show_both(self, wanted: tuple[ReliefParams, View]) -> None:
+        self._show(*wanted)
 
     def reset(self) -> None:
         """Go back to the beginning; `undo` takes that back."""

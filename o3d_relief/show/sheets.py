@@ -14,9 +14,10 @@ from o3d_relief.errors import FileError, ParameterError
 from o3d_relief.records import StageRecord
 from o3d_relief.show.annotate import font_size, write
 from o3d_relief.show.camera import fit_scale, view_direction
+from o3d_relief.show.easel import Easel
 from o3d_relief.show.render import plate_bounds, render, save_png
 from o3d_relief.show.scan_panels import SCAN_PANELS
-from o3d_relief.show.stage_panels import PANELS, Easel
+from o3d_relief.show.stage_panels import PANELS
 
 if TYPE_CHECKING:
     import open3d as o3d

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from o3d_relief.errors import ParameterError
 from o3d_relief.records import (
     AttenuationStage,
     BoundedStage,
@@ -17,26 +14,20 @@ from o3d_relief.records import (
     CompressionStage,
     ConstructionStage,
     OrderStage,
-    PerspectiveStage,
     RestorationStage,
     SceneStage,
-    StageRecord,
     TrimStage,
     VisibilityStage,
     final_heights,
 )
 from o3d_relief.show.camera import view_direction
 from o3d_relief.show.colors import label_colors
+from o3d_relief.show.easel import Easel, Pictures
 from o3d_relief.show.render import render
 
-if TYPE_CHECKING:
-    import open3d as o3d
+__all__ = ["ACTIONS", "HIDDEN", "OBLIQUE", "PANELS", "SEEN"]
 
-__all__ = ["ACTIONS", "HIDDEN", "OBLIQUE", "PANELS", "SEEN", "Easel", "Pictures"]
-
-Pictures = list[NDArray[np.uint8]]
 Vector = tuple[float, float, float]
-_Record = TypeVar("_Record", bound=StageRecord)
 
 _FRONT: Vector = (0.0, 0.0, 1.0)
 OBLIQUE = view_direction(38.0, 12.0)
@@ -46,55 +37,6 @@ _SIDE = view_direction(65.0, 8.0)
 _GAP = 4  # pixels
 SEEN, HIDDEN = (0.93, 0.78, 0.42), (0.33, 0.45, 0.62)
 ACTIONS = {"attach": (0.16, 0.47, 0.71), "scale": (0.93, 0.66, 0.16), "discard": (0.78, 0.17, 0.20)}
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Easel:
-    """The records of a run, and how large to draw.
-
-    Attributes
-    ----------
-    stages : mapping of str to StageRecord
-    size : (width, height)
-        Of one panel, in pixels.
-    relief : open3d.geometry.TriangleMesh or None
-        The finished relief.
-    """
-
-    stages: Mapping[str, StageRecord]
-    size: tuple[int, int]
-    relief: o3d.geometry.TriangleMesh | None = None
-
-    def record(self, kind: type[_Record]) -> _Record:
-        """Return the record of a stage.
-
-        Raises
-        ------
-        ParameterError
-            There is none.
-        """
-        record = self.stages.get(kind.name)
-        if not isinstance(record, kind):
-            raise ParameterError(f"The stage {kind.name!r} has no record.")
-        return record
-
-    @property
-    def vertices(self) -> NDArray[np.float64]:
-        """The vertices (n, 3) after the forced perspective."""
-        return self.record(PerspectiveStage).vertices
-
-    def raised(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the vertices with other heights (n,)."""
-        return np.column_stack([self.vertices[:, :2], z])
-
-    def mesh(self, vertices: NDArray[np.float64]) -> o3d.geometry.TriangleMesh:
-        """Return the scene's faces over these vertices (n, 3)."""
-        import open3d as o3d
-
-        return o3d.geometry.TriangleMesh(
-            o3d.utility.Vector3dVector(vertices.copy()),  # records are read-only
-            o3d.utility.Vector3iVector(self.record(SceneStage).faces.astype(np.int32)),
-        )
 
 
 def _bounds(*surfaces: NDArray[np.float64]) -> NDArray[np.float64]:

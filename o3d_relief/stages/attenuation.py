@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from o3d_relief.errors import SolverError
+from o3d_relief.linalg.box import box_minimum
 from o3d_relief.linalg.one_thread import one_thread
-from o3d_relief.linalg.solve import solve_direct
 
 __all__ = [
     "NewHeights",
@@ -30,8 +29,6 @@ NEIGHBOURS = 4
 
 _SAME_HEIGHT = 1e-6
 """Heights closer than this, in relief units, count as equal."""
-
-_ROUNDS = 50
 
 
 def select_points(
@@ -297,32 +294,5 @@ def _bounded_least_squares(
     columns = laplacian[:, free]
     normal = (columns.T @ columns + sp.diags_array(attached[free].astype(float))).tocsr()
     with one_thread():
-        result[free] = _bounded_minimum(normal, columns.T @ wanted, height[free])
+        result[free] = box_minimum(normal, columns.T @ wanted, height[free])
     return result
-
-
-def _bounded_minimum(
-    form: sp.csr_array, pull: NDArray[np.float64], upper: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Minimise x' form x / 2 - pull' x subject to 0 <= x <= upper by a primal-dual active set.
-
-    Where the active set comes back to one that it had before, which it may on a few inputs, only the worst
-    violation of each round is exchanged from there on.
-    """
-    state = np.zeros(len(pull), dtype=np.int64)  # -1 on the lower bound, 1 on the upper, 0 between
-    seen: set[bytes] = set()
-    for _ in range(_ROUNDS + 20 * len(pull)):
-        x = np.where(state > 0, upper, 0.0)
-        free = state == 0
-        rows = form[np.flatnonzero(free)]
-        x[free] = solve_direct(rows[:, np.flatnonzero(free)], pull[free] - rows @ x)
-        force = form @ x - pull  # positive where x is held up, negative where it is held down
-        excess = np.where(free, np.maximum(-x, x - upper), state * force)
-        wrong = excess > 1e-10 * (1.0 + upper)
-        if not wrong.any():
-            return np.clip(x, 0.0, upper)
-        if state.tobytes() in seen:
-            wrong = np.arange(len(x)) == excess.argmax()
-        seen.add(state.tobytes())
-        state = np.where(wrong, np.where(free, np.where(x < 0.0, -1, 1), 0), state)
-    raise SolverError("The new heights of the attenuation points (Eq. 5) could not be found.")
