@@ -1,4 +1,4 @@
-"""One step of the way from points to a mesh each: takes what the steps before have found, returns its record.
+"""The steps from points to oriented normals: each takes what those before have found, returns its record.
 
 They work on centred points of unit extent, so that neither far origins nor odd units cost precision.
 """
@@ -20,22 +20,16 @@ from o3d_relief.scan.ground import find_ground
 from o3d_relief.scan.neighbours import Neighbours, find_neighbours, local_spacings, outliers, thin
 from o3d_relief.scan.normals import agreement, check_normals, estimate_normals
 from o3d_relief.scan.orientation import away_votes, edge_agreement, propagate, towards
-from o3d_relief.scan.poisson import depth_for, poisson_surface
-from o3d_relief.scan.skin import carry_colors, keep_parts, support, used_only
 from o3d_relief.scan_params import ScanParams
 from o3d_relief.scan_records import (
     GroundStage,
     NormalsStage,
     OrientationStage,
     OutliersStage,
-    PartsStage,
     PointsStage,
-    SkinStage,
-    SurfaceStage,
 )
 from o3d_relief.scene.arrays import CloudArrays
 from o3d_relief.scene.weld import first_of_equal_rows
-from o3d_relief.stages.trim import trim_behind
 
 __all__ = [
     "Work",
@@ -43,10 +37,7 @@ __all__ = [
     "normals_step",
     "orientation_step",
     "outliers_step",
-    "parts_step",
     "points_step",
-    "skin_step",
-    "surface_step",
 ]
 
 _LEAST_POINTS = 50
@@ -63,12 +54,6 @@ _DECIDED = 0.8
 
 _LARGEST = 1e100
 """A wider cloud has numbers that are no coordinates; their squares would overflow."""
-
-_FINEST = 1e-12
-"""Least spacing, as a share of the cloud's size: points that are closer have no spacing to speak of."""
-
-_WIDEST = 4.0
-"""The spacing around a single point counts up to so many times the median."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -252,68 +237,3 @@ def _own_sign(points: NDArray[np.float64], axes: NDArray[np.float64], votes: NDA
     if outwards >= _DECIDED:
         return 1.0
     return -1.0 if outwards <= 1.0 - _DECIDED else 0.0
-
-
-def surface_step(
-    work: Work, oriented: OrientationStage, params: ScanParams, *, tick: Tick = silent
-) -> SurfaceStage:
-    """Lay a closed surface through the points."""
-    used = oriented.normals.any(axis=1)
-    points = work.points[used]
-    spacing = float(np.median(work.local_spacing[used]))
-    depth = params.depth
-    if depth is None:
-        depth = depth_for(float(np.ptp(points, axis=0).max()), spacing)
-    vertices, faces, density = poisson_surface(
-        points, oriented.normals[used], depth=depth, threads=params.threads, tick=tick
-    )
-    return SurfaceStage(
-        vertices=work.back(vertices),
-        faces=faces,
-        density=density,
-        depth=depth,
-        counts={"depth": depth, "vertices": len(vertices), "faces": len(faces)},
-    )
-
-
-def skin_step(work: Work, oriented: OrientationStage, surface: SurfaceStage, params: ScanParams) -> SkinStage:
-    """Cut away what of the surface no points support."""
-    used = oriented.normals.any(axis=1)
-    # Along the border of a scan circles are half empty; the neighbours further in know better.
-    around = np.percentile(work.local_spacing[work.neighbours.index[used]], 25.0, axis=1)
-    local = np.minimum(around, _WIDEST * float(np.median(work.local_spacing[used])))
-    local = np.maximum(local, _FINEST)
-    vertices = (surface.vertices - work.centre) / work.size
-    distance, nearest = cKDTree(work.points[used]).query(vertices, workers=-1)
-    distance = distance / local[nearest]
-    inside = support(surface.faces, distance, surface.density, params.max_hole)
-    # The support takes the place of the height over the plane at which reliefs are cut.
-    heights = np.column_stack([np.zeros((len(inside), 2)), inside])
-    cut = trim_behind(heights, surface.faces, np.ones(len(inside), dtype=bool))
-    if len(cut.faces) == 0:
-        raise MeshError("Nothing of the surface lies near the points: the cloud is too sparse or too noisy.")
-    return SkinStage(
-        distance=distance,
-        vertices=work.back(cut.to_vertices(vertices)),
-        faces=cut.faces,
-        counts={"faces": len(cut.faces), "faces_dropped": cut.faces_dropped},
-    )
-
-
-def parts_step(
-    points: PointsStage, oriented: OrientationStage, skin: SkinStage, params: ScanParams
-) -> PartsStage:
-    """Keep the parts that are large enough and colour them."""
-    kept, dropped = keep_parts(skin.vertices, skin.faces, params.min_part)
-    index, faces = used_only(skin.faces[kept], len(skin.vertices))
-    vertices = skin.vertices[index]
-    used = oriented.normals.any(axis=1)
-    colors = None
-    if points.colors is not None:
-        colors = carry_colors(vertices, points.points[used], points.colors[used])
-    return PartsStage(
-        vertices=vertices,
-        faces=faces,
-        colors=colors,
-        counts={"parts_dropped": dropped, "vertices": len(vertices), "faces": len(faces)},
-    )

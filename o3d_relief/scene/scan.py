@@ -13,16 +13,8 @@ from o3d_relief.journal import Journal, OnStage
 from o3d_relief.params import View
 from o3d_relief.progress import OnProgress
 from o3d_relief.records import StageRecord
-from o3d_relief.scan.steps import (
-    ground_step,
-    normals_step,
-    orientation_step,
-    outliers_step,
-    parts_step,
-    points_step,
-    skin_step,
-    surface_step,
-)
+from o3d_relief.scan.steps import ground_step, normals_step, orientation_step, outliers_step, points_step
+from o3d_relief.scan.surface_steps import parts_step, skin_step, surface_step
 from o3d_relief.scan_params import ScanParams
 from o3d_relief.scene.arrays import MeshArrays, cloud_arrays, to_open3d
 
