@@ -54,7 +54,6 @@ def bounded_step(
     face, share = seen_points(vertices, faces)
     in_front = seen_faces(faces, visible, face)
     kept = _kept_shape(scene, params)[faces].mean(axis=1)
-    weight = kept * face_weights(vertices, faces, in_front)
     attached = _attached(scene, params)
     # Points of faces with visible corners only are in front where the corners are.
     partly = ~visible[faces[face]].all(axis=1)
@@ -62,6 +61,7 @@ def bounded_step(
     lowest = lowest_seen(z, seen, visible)
     depth = _wanted_depth(scene, params)
     deep = float(z.max()) - lowest
+    weight = kept * face_weights(vertices, faces, in_front, depth / max(deep, depth))
     if deep <= depth:
         shallow = {"already_shallower": 1, "attached_missed": int((z[attached] > lowest).sum())}
         return BoundedStage(face_weight=weight, attached=attached, z=on_plane(z - lowest), counts=shallow)
