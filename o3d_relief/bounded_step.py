@@ -54,14 +54,15 @@ def bounded_step(
     face, share = seen_points(vertices, faces)
     in_front = seen_faces(faces, visible, face)
     kept = _kept_shape(scene, params)[faces].mean(axis=1)
-    weight = kept * face_weights(vertices, faces, in_front)
     attached = _attached(scene, params)
     # Points of faces with visible corners only are in front where the corners are.
     partly = ~visible[faces[face]].all(axis=1)
     seen = point_rows(faces, face[partly], share[partly], n)
     lowest = lowest_seen(z, seen, visible)
     deep = float(z.max()) - lowest
-    if deep <= cast(float, params.depth) / scene.unit:
+    wanted = cast(float, params.depth) / scene.unit
+    weight = kept * face_weights(vertices, faces, in_front, wanted / max(deep, wanted))
+    if deep <= wanted:
         shallow = {"already_shallower": 1, "attached_missed": int((z[attached] > lowest).sum())}
         return BoundedStage(face_weight=weight, attached=attached, z=on_plane(z - lowest), counts=shallow)
 

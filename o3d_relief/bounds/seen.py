@@ -14,6 +14,9 @@ __all__ = ["face_weights", "seen_faces", "seen_points"]
 _STEEP = 0.3
 """Weight of the steepest triangles that are seen: they may turn most, but they are no free hinges."""
 
+_SHALLOW = 0.5
+"""The same at next to no depth."""
+
 _HIDDEN = 0.05
 """Weight of what is not seen."""
 
@@ -65,29 +68,35 @@ def seen_faces(
 
 
 def face_weights(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], seen: NDArray[np.bool_]
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], seen: NDArray[np.bool_], share: float
 ) -> NDArray[np.float64]:
     """Weigh each triangle by how much a change of it shows.
 
-    The slope of a steep triangle may change much before its normal does: its weight is |n_z|, the share of
-    its area that is seen, and at least 0.3. With less, narrow steep bands (the jaw of a face) take all of the
-    depth and become clefts. What is hidden takes the rest, with a weight of 0.05: nobody sees it bend.
+    The slope of a steep triangle may change much before its normal does: its weight is sqrt(n_z^2 + s^2),
+    about the share n_z of its area that is seen, and at least s. The force that flattens a surface is much
+    the same all over it: what is softer than the rest gives in until it is level or leans the other way, and
+    narrow steep bands (the jaw of a face) become clefts or bright rims. The shallower the relief, the larger
+    the force: s is 0.5 less the relief's share of the scene's depth, and at least 0.3. What is hidden takes
+    the rest, with a weight of 0.05: nobody sees it bend.
 
     Parameters
     ----------
     vertices : (n, 3) float64
     faces : (m, 3) int64
     seen : (m,) bool
+    share : float
+        Depth of the relief, as a share of that of the scene.
 
     Returns
     -------
     (m,) float64
     """
+    steepest = max(_STEEP, _SHALLOW - share)
     a, b, c = vertices[faces].transpose(1, 0, 2)
     normal = np.cross(b - a, c - a)
     size = np.linalg.norm(normal, axis=1)
     towards = np.abs(normal[:, 2]) / np.where(size > 0.0, size, 1.0)
-    return np.where(seen, np.maximum(towards, _STEEP), _HIDDEN)
+    return np.where(seen, np.hypot(towards, steepest), _HIDDEN)
 
 
 def point_rows(

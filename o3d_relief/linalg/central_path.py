@@ -126,6 +126,11 @@ class CentralPath:
         some = np.flatnonzero(counted)
         return np.asarray(rest + self.rows[some].T @ self.force[2][some])
 
+    def broken(self, x: Vector) -> sp.csr_array:
+        """Return the known rows that an x breaks, (q, n)."""
+        others, bound = self._others.rows, self._others.bound
+        return sp.vstack([self.rows[self.rows @ x <= self._bound], others[others @ x <= bound]]).tocsr()
+
     def add(self, rows: sp.csr_array, bound: Vector) -> None:
         """Add rows, but for those that have been added before.
 

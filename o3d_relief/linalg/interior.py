@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from o3d_relief.linalg.central_path import CentralPath
+from o3d_relief.linalg.last_step import last_step
 from o3d_relief.linalg.one_thread import one_thread
 from o3d_relief.linalg.patches import Patches
 from o3d_relief.linalg.refining import Refining
@@ -153,9 +154,12 @@ def _run(
             if path.objective(accepted) - least <= accuracy * path.energy(accepted):
                 break
             next_check = path.rounds + _CHECK_EVERY - close
-    if refining is not None and not np.isfinite(least):
+    if refining is None:
+        return accepted, least
+    if not np.isfinite(least):
         least = path.least() - refining.cost()
-    return accepted, least
+    refining.leave()
+    return last_step(path, accepted, more_rows, _CENTRAL * accuracy * path.energy(path.x)), least
 
 
 def _check(path: CentralPath, accepted: Vector, more_rows: MoreRows) -> Vector:

@@ -32,10 +32,15 @@ class NearRows:
         R.
     bound : (p,) float64
         b.
+
+    Attributes
+    ----------
+    rows, bound
+        The same: all of them.
     """
 
     def __init__(self, rows: sp.csr_array, bound: Vector) -> None:
-        self._all, self._all_bound = rows, bound
+        self.rows, self.bound = rows, bound
         weights = sp.csr_array((np.abs(rows.data), rows.indices, rows.indptr), shape=rows.shape)
         self._width = weights @ np.ones(rows.shape[1])
         self._taken = np.zeros(len(bound), dtype=bool)
@@ -55,28 +60,28 @@ class NearRows:
             What would not be broken on so many times the step need not be near.
         """
         way = times * float(np.abs(step).max(initial=0.0))
-        few = len(self._number) <= _MOST * len(self._all_bound)
+        few = len(self._number) <= _MOST * len(self.bound)
         if way > self._reach or (not few and _SPARE * way < self._reach):
             self._gather(x, way)
         self._moves = self._rows @ step
         return room(self._slack, self._moves)
 
     def _gather(self, x: Vector, way: float) -> None:
-        slack = self._all @ x - self._all_bound
+        slack = self.rows @ x - self.bound
         near = ~self._taken & (slack < _AHEAD * way * self._width)
         if np.count_nonzero(near) > _MOST * len(near):
-            self._reach, self._rows, self._number = np.inf, self._all, np.arange(len(near))
+            self._reach, self._rows, self._number = np.inf, self.rows, np.arange(len(near))
             self._slack = np.where(self._taken, np.inf, slack)
         else:
             self._reach, self._number = _AHEAD * way, np.flatnonzero(near)
-            self._rows, self._slack = self._all[self._number], slack[self._number]
+            self._rows, self._slack = self.rows[self._number], slack[self._number]
 
     def take(self, chosen: NDArray[np.bool_]) -> tuple[sp.csr_array, Vector]:
         """Take rows out, (q,); return them, and their bounds."""
         number = self._number[chosen]
         self._taken[number] = True
         self._slack[chosen] = np.inf
-        return self._all[number], self._all_bound[number]
+        return self.rows[number], self.bound[number]
 
     def moved(self, length: float, step: Vector) -> None:
         """Go a share of the step that `reach` was asked about last."""

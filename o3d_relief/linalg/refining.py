@@ -48,6 +48,7 @@ class Refining:
     """
 
     def __init__(self, path: CentralPath, patches: Patches) -> None:
+        self._everywhere = path.newton
         self._path, self._patches = path, patches
         self._form = (path.form + sp.diags_array(_RIDGE * path.form.diagonal())).tocsr()
         self._cycle = multigrid(self._form)
@@ -90,6 +91,10 @@ class Refining:
         if local > 0.0 and not self._path.lacking.any():
             self._more = max(self._more, cost / local)
         return cost
+
+    def leave(self) -> None:
+        """Take the next steps from the space of all displacements."""
+        self._path.newton = self._everywhere
 
     def _local(self, rest: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return what each vertex alone could gain outside of the space, (n,)."""

@@ -22,7 +22,7 @@ def closest(shape, depth, *, attach=(), weights=None, min_gap=0.0):
     n = len(vertices)
     visible = visible_vertices(vertices, faces)
     face, share = seen_points(vertices, faces, side=256)
-    weight = face_weights(vertices, faces, seen_faces(faces, visible, face))
+    weight = face_weights(vertices, faces, seen_faces(faces, visible, face), 0.2)
     form, _ = cotangent_laplacian(vertices, faces, weights=weight if weights is None else weight * weights)
     partly = ~visible[faces[face]].all(axis=1)
     pairs = Pairs.join([vertex_pairs(Lines(vertices, faces)), grid_pairs(Lines(vertices, faces), side=256)])

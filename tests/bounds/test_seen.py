@@ -24,8 +24,10 @@ def test_weights_are_those_of_the_slopes():
     # A level face, one at 60 degrees (n_z = 1/2), an upright one, and one that is hidden.
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, np.sqrt(3.0)], [0, 0, 1.0]])
     faces = np.array([[0, 1, 2], [0, 3, 2], [0, 4, 2], [0, 1, 2]])
-    weights = face_weights(vertices, faces, np.array([True, True, True, False]))
-    assert weights == pytest.approx([1.0, 0.5, 0.3, 0.05])
+    seen = np.array([True, True, True, False])
+    for share, steepest in ((0.5, 0.3), (0.1, 0.4)):
+        expected = [*np.hypot([1.0, 0.5, 0.0], steepest), 0.05]
+        assert face_weights(vertices, faces, seen, share) == pytest.approx(expected)
 
 
 def test_rows_give_the_heights_of_points():

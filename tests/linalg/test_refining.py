@@ -1,25 +1,9 @@
-import numpy as np
 import pytest
-import scipy.sparse as sp
+from membrane import obstacle
 
 from o3d_relief.linalg import refining
-from o3d_relief.linalg.central_path import CentralPath
-from o3d_relief.linalg.laplacian import cotangent_laplacian
 from o3d_relief.linalg.patches import Patches
 from o3d_relief.linalg.refining import Refining
-from shapes import hills
-
-
-def obstacle(side=40):
-    """A membrane that is pulled down onto bounds, and its path."""
-    vertices, faces = hills(side)
-    n = len(vertices)
-    form = (cotangent_laplacian(vertices, faces)[0] + 1e-3 * sp.eye_array(n)).tocsr()
-    bumps = -1.0 - np.cos(vertices[:, 0] / 4.0) * np.cos(vertices[:, 1] / 4.0)
-    none = sp.csr_array((0, n)), np.zeros(0)
-    bounds = bumps, np.full(n, np.inf)
-    path = CentralPath(form, np.full(n, -0.5), np.zeros(n), np.ones(n), *bounds, *none, vertices)
-    return path, vertices
 
 
 def follow(path, refined=None, *, accuracy=0.02, rounds=50):
