@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from o3d_relief.bounds.grid import grid_pairs
+from o3d_relief.bounds.columns import column_pairs
 from o3d_relief.bounds.lines import Lines
 from o3d_relief.bounds.near_points import NearPoints
 from o3d_relief.bounds.order import Ordered, keep_order
@@ -50,7 +50,7 @@ def order_step(
     min_gap = params.min_gap / unit / (0.95 * lowest if ratio < 1.0 else 1.0)
     turns = edges_that_turn(vertices, faces)
     # For a smallest gap, which need not be least at vertices and silhouettes, the grid is a fine one.
-    grid = grid_pairs(lines, side=_LINES if min_gap == 0.0 else 4 * _LINES)
+    grid = column_pairs(lines, side=_LINES if min_gap == 0.0 else 4 * _LINES)
     pairs = Pairs.join([pairs, silhouette_pairs(vertices, faces, turns), close_pairs(lines), grid])
     areas = vertex_areas(vertices, faces)
     front = visible if params.in_front else None

@@ -105,7 +105,7 @@ def _serve(pipe: Connection) -> None:
         "OMP_NUM_THREADS": "1",
         "OPENBLAS_NUM_THREADS": "1",
     }
-    from o3d_relief import bounded_step, order_step
+    from o3d_relief import bounded_step
     from o3d_relief.bounds import certificate
     from o3d_relief.linalg import interior, solve
     from o3d_relief.stages import attenuation, clustering
@@ -117,7 +117,7 @@ def _serve(pipe: Connection) -> None:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     # A million rays for a mesh of fifty vertices, and to look for the libraries that use threads before each
     # small system, would be nearly all of the time.
-    for module in (order_step, bounded_step, certificate):
+    for module in (bounded_step, certificate):
         module.grid_pairs = partial(module.grid_pairs, side=_GRID)
     bounded_step.seen_points = partial(bounded_step.seen_points, side=_GRID)
     for module in (solve, interior, clustering, attenuation):

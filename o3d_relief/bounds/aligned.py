@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -45,79 +48,85 @@ def aligned_pairs(
         begins.
     """
     number = prints.numbers()
-    itself = np.tile(prints.first, (2, 1))
-    plane = np.ascontiguousarray(vertices[:, :2])
-    a, b = np.concatenate([both, both[::-1], itself], axis=1)
-    a, b, place = _on_each_other(plane, edges, a, b)
-    covered = _cover(plane, edges, prints, number, a, b, place)
+    ends = np.ascontiguousarray(vertices[:, :2]).take(edges.ravel(), axis=0).reshape(-1, 4)
+    first = prints.first
+    found = [_on_each_other(ends, one, other) for one, other in (both, both[::-1], (first, first))]
+    a, b, place, parallel, same_way, off = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    over, covered = number[b], _cover(prints, number[a], number[b], parallel, same_way, off)
+    a, place, over = a[covered], place[covered], over[covered]
     # Every end above the place, on every edge over the footprint.
-    tips, tip_of = prints.members(number[a[covered]])
-    ends = edges[tips]
-    same = vertices[edges[a, place], :2][covered][tip_of]
-    at = np.abs(vertices[ends, :2] - same[:, None]).max(axis=2).argmin(axis=1)
-    tip, over = ends[np.arange(len(ends)), at], number[b[covered][tip_of]]
-    once = np.unique(tip * len(prints.first) + over)
-    tip, over = np.divmod(once, max(len(prints.first), 1))
+    tips, tip_of = prints.members(number[a])
+    corners = edges[tips]
+    same = vertices[edges[a, place], :2][tip_of]
+    at = np.abs(vertices[corners, :2] - same[:, None]).max(axis=2).argmin(axis=1)
+    tip, over = corners[np.arange(len(corners)), at], over[tip_of]
+    once = np.unique(tip * len(first) + over)
+    tip, over = np.divmod(once, max(len(first), 1))
     return _next_on(vertices, edges, prints, tip, over)
 
 
 def _on_each_other(
-    plane: NDArray[np.float64], edges: NDArray[np.int64], a: NDArray[np.int64], b: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Choose edges a of which an end lies on b in the picture; return them and which end, 0 or 1."""
+    ends: NDArray[np.float64], a: NDArray[np.int64], b: NDArray[np.int64]
+) -> tuple[NDArray[Any], ...]:
+    """Choose edges a of which an end lies inside b in the picture, or that lie along b for a stretch.
+
+    Parameters
+    ----------
+    ends : (e, 4) float64
+        x and y of both ends of each edge.
+    a, b : (q,) int64
+
+    Returns
+    -------
+    a, b, place : (c,) int64
+        The edges, and which end of a it is, 0 or 1.
+    parallel, same_way : (c,) bool
+        Whether the other end of a is on the line through b, too, and whether both turn the same way.
+    off : (c,) float64
+        How far the other end of a is to the left of b.
+    """
     found = []
-    for end in (0, 1):
-        on = np.zeros(len(a), dtype=bool)
-        for block in range(0, len(a), _BLOCK):
-            part = slice(block, block + _BLOCK)
-            share, off, length = projected(plane, edges.take(b[part], axis=0), edges[a[part], end])
-            along = (share * length >= -ON) & ((share - 1.0) * length <= ON)
-            on[part] = (np.abs(off) <= ON) & along
-        found.append((a[on], b[on], np.full(np.count_nonzero(on), end)))
-    one, other, ends = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    return one, other, ends
+    for begin in range(0, len(a) or 1, _BLOCK):
+        block = slice(begin, begin + _BLOCK)
+        for place, (chosen, *told) in enumerate(
+            _lying(ends.take(a[block], axis=0).T, ends.take(b[block], axis=0).T)
+        ):
+            found.append((a[block][chosen], b[block][chosen], np.full(len(chosen), place), *told))
+    return tuple(np.concatenate(parts) for parts in zip(*found, strict=True))
+
+
+def _lying(a: NDArray[np.float64], b: NDArray[np.float64]) -> Iterator[tuple[NDArray[Any], ...]]:
+    """Do so for each end of one block of them, (4, q)."""
+    x, y = b[0], b[1]
+    along_x, along_y = b[2] - x, b[3] - y
+    length = np.sqrt(along_x**2 + along_y**2)
+    # How far along b, and to its left, both ends of a are.
+    at = [(along_x * (a[tip] - x) + along_y * (a[tip + 1] - y)) / length for tip in (0, 2)]
+    off = [(along_x * (a[tip + 1] - y) - along_y * (a[tip] - x)) / length for tip in (0, 2)]
+    stretch = np.minimum(np.maximum(*at), length) - np.maximum(np.minimum(*at), 0.0)
+    for tip, far in ((0, 1), (1, 0)):
+        parallel = np.abs(off[far]) <= ON
+        on = (np.abs(off[tip]) <= ON) & (at[tip] >= -ON) & (at[tip] - length <= ON)
+        # At its corners, other edges tell.
+        inside = (at[tip] > ON) & (length - at[tip] > ON)
+        chosen = np.flatnonzero(on & np.where(parallel, stretch > ON, inside))
+        same_way = (a[2] - a[0])[chosen] * along_x[chosen] + (a[3] - a[1])[chosen] * along_y[chosen] > 0.0
+        yield chosen, parallel[chosen], same_way, off[far][chosen]
 
 
 def _cover(
-    plane: NDArray[np.float64],
-    edges: NDArray[np.int64],
     prints: Footprints,
-    number: NDArray[np.int64],
     a: NDArray[np.int64],
     b: NDArray[np.int64],
-    place: NDArray[np.int64],
+    parallel: NDArray[np.bool_],
+    same_way: NDArray[np.bool_],
+    off: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
-    """Tell for each end of an edge a that lies on b whether faces over the footprints of both overlap."""
-    covered = np.zeros(len(a), dtype=bool)
-    for block in range(0, len(a), _BLOCK):
-        part = slice(block, block + _BLOCK)
-        covered[part] = _covers(plane, edges, prints, number, a[part], b[part], place[part])
-    return covered
-
-
-def _covers(
-    plane: NDArray[np.float64],
-    edges: NDArray[np.int64],
-    prints: Footprints,
-    number: NDArray[np.int64],
-    a: NDArray[np.int64],
-    b: NDArray[np.int64],
-    place: NDArray[np.int64],
-) -> NDArray[np.bool_]:
-    """Do so for one block of them."""
+    """Tell whether faces over two footprints overlap, by what `_on_each_other` returns of their edges."""
     left, right = prints.left, prints.right
-    tip, far = edges[a, place], edges[a, 1 - place]
-    share, off, length = projected(plane, edges[b], far)
-    start, _, _ = projected(plane, edges[b], tip)
-    parallel = np.abs(off) <= ON
-    stretch = (np.minimum(np.maximum(start, share), 1.0) - np.maximum(np.minimum(start, share), 0.0)) * length
-    along = [plane[edges[e, 1]] - plane[edges[e, 0]] for e in (a, b)]
-    same_way = np.einsum("qk,qk->q", *along) > 0.0
-    a, b = number[a], number[b]
     a_left, a_right = np.where(same_way, left[a], right[a]), np.where(same_way, right[a], left[a])
     together = (a_left & left[b]) | (a_right & right[b])
-    inside = (start * length > ON) & ((1.0 - start) * length > ON)  # at corners, other edges tell
-    return np.where(parallel, together & (stretch > ON), inside & np.where(off > 0.0, left[b], right[b]))
+    return np.asarray(np.where(parallel, together, np.where(off > 0.0, left[b], right[b])))
 
 
 def _next_on(

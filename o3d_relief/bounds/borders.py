@@ -49,10 +49,9 @@ class Borders:
         self, triangle: NDArray[np.int64], weights: NDArray[np.float64]
     ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Return the corners of triangles, (3, q), and to which of their sides points are close, (3, q)."""
-        corners = self._faces[triangle].T
-        start, end = corners[[1, 2, 0]], corners[[2, 0, 1]]
-        x, y = (self._vertices[:, axis] for axis in (0, 1))
-        across, along = x[end] - x[start], y[end] - y[start]
+        corners = np.ascontiguousarray(self._faces.take(triangle, axis=0).T)
+        x, y = (at.reshape(corners.shape) for at in self._vertices.take(corners.ravel(), axis=0).T[:2])
+        across, along = x[[2, 0, 1]] - x[[1, 2, 0]], y[[2, 0, 1]] - y[[1, 2, 0]]
         area = np.abs(across[0] * along[1] - along[0] * across[1])
         height = area / np.maximum(np.sqrt(across**2 + along**2), np.finfo(np.float64).tiny)
         return corners, weights.T * height < 2 * SAME_PLACE
@@ -60,12 +59,16 @@ class Borders:
     def _at_borders(self, corners: NDArray[np.int64], near: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Tell which points (q,) that are close to some sides of their triangles, (3, q), are at a border."""
         start, end = corners[[1, 2, 0]], corners[[2, 0, 1]]
+        corner_on_border = self._at_border[corners]
+        likely = near & corner_on_border[[1, 2, 0]] & corner_on_border[[2, 0, 1]]
+        start, end = start[likely], end[likely]
         edge = np.minimum(start, end) * len(self._vertices) + np.maximum(start, end)
         place = np.minimum(np.searchsorted(self._single, edge), len(self._single) - 1)
-        on_border, corner_on_border = self._single[place] == edge, self._at_border[corners]
+        on_border = np.zeros(likely.shape, dtype=bool)
+        on_border[likely] = self._single[place] == edge
         found = np.zeros(corners.shape[1], dtype=bool)
         for side in range(3):
-            found |= near[side] & on_border[side]
+            found |= on_border[side]
             found |= near[side - 2] & near[side - 1] & corner_on_border[side]
         return found
 

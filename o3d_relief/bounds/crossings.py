@@ -146,11 +146,14 @@ def new_crossings(
         Number of crossings.
     """
     before = vertices[:, 2]
-    found = crossings(np.column_stack([vertices[:, :2], z]), faces, edges)
+    # Neither edges nor triangles behind S count: no rays for them.
+    in_front, (a, b, c) = z > 0.0, faces.T
+    front = faces.compress(in_front[a] | in_front[b] | in_front[c], axis=0)
+    rising = edges.compress(in_front[edges[:, 0]] | in_front[edges[:, 1]], axis=0)
+    found = crossings(np.column_stack([vertices[:, :2], z]), front, rising)
     new = found.pierced(z, deep=_SURE) & ~found.pierced(before)
     apart = np.abs(found.gaps(before)).max(axis=1) > _DEEP
     new |= apart & found.pierced(z, deep=_SHALLOW) & ~found.pierced(before, deep=_SHALLOW / 2.0)
-    new &= (z[found.face].max(axis=1) > 0.0) & (z[found.edge].max(axis=1) > 0.0)
     found = found.select(new)
     pairs = found.pairs(before, z)
     if not 0 < len(found) <= _FEW:
@@ -189,7 +192,7 @@ def crossings(vertices: NDArray[np.float64], faces: NDArray[np.int64], edges: ND
         share a vertex do not count, nor do triangles that stand upright on S: nothing is above them.
     """
     none = np.zeros(0, dtype=np.int64)
-    if len(edges) == 0:  # all that is left of the relief has shrunk to lines
+    if len(edges) == 0 or len(faces) == 0:  # all that is left of the relief has shrunk to lines
         return _stretches(vertices[:, :2], edges[none], faces[none])
     scene, middle, size = unit_box(vertices, faces)
     places = (vertices - middle + [0.0, 0.0, _OVER]) / size

@@ -21,6 +21,9 @@ x and y is one of more than 1e-3 relief units in z."""
 _BLOCK = 16384
 """Triangles that are worked on at once."""
 
+_FEW = 1000
+"""Rays that meet what stands upright up to which all that they meet is listed."""
+
 MISS = 0xFFFFFFFF
 """What RaycastingScene calls the triangle that a ray does not meet."""
 
@@ -186,9 +189,13 @@ class Lines:
         others = found.select(np.flatnonzero(~standing))
         if len(self.faces) == 0:
             return others
-        # Behind what stands upright may be what is met first. To list all that is met would be too much where
-        # a wall is a little rough: every other of its vertices has half of the wall above it.
-        ray, box = found.ray[standing], self._lying_box
+        # Behind what stands upright may be what is met first. For a few rays all that is met is listed, which
+        # needs no other scene. It would be too much where a wall is a little rough: every other of its
+        # vertices has half of the wall above it.
+        ray = found.ray[standing]
+        if len(ray) <= _FEW:
+            return others.joined(_first_of_each(self.all(origins[ray], direction)).of(ray))
+        box = self._lying_box
         answer = box.scene.cast_rays(box.rays(origins[ray], direction))
         return others.joined(_read(answer, np.arange(len(self.faces)), box.size).of(ray))
 
@@ -197,6 +204,12 @@ class Lines:
         answer = self._box.scene.list_intersections(self._box.rays(origins, direction))
         found = _read(answer, self._number, self.size)
         return found.select(np.flatnonzero(found.triangle >= 0))
+
+
+def _first_of_each(hits: Hits) -> Hits:
+    """Return the nearest hit of each ray, by rising ray."""
+    order = np.lexsort((hits.distance, hits.ray))
+    return hits.select(order[np.diff(hits.ray[order], prepend=-1) > 0])
 
 
 def _read(answer: dict[str, o3d.core.Tensor], number: NDArray[np.int64], size: float) -> Hits:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from o3d_relief.bounds.aligned import APART, aligned_pairs
 from o3d_relief.bounds.footprints import footprints
+from o3d_relief.bounds.meeting import CLEAR, Boxes, combinations, meeting
 from o3d_relief.bounds.pairs import Pairs
 
 __all__ = ["edges_that_turn", "silhouette_pairs", "silhouettes"]
@@ -16,12 +17,6 @@ _FEWEST_CELLS, _MOST_CELLS = 128, 4096
 
 _PIECE = 0.9
 """Length of the pieces of edges, in cells, at most: with a margin they meet four cells."""
-
-_CLEAR = 1e-3
-"""Edges cross in the picture where each reaches this far beyond the other, in relief units."""
-
-_BLOCK = 16384
-"""Edges that are worked on at once."""
 
 
 def silhouettes(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -114,16 +109,26 @@ def silhouette_pairs(
     """
     edges, turning = edges_that_turn(vertices, faces) if turns is None else turns
     plane = np.ascontiguousarray(vertices[:, :2])
+    ends = plane.take(edges.ravel(), axis=0).reshape(-1, 4)
     # Of edges on top of each other, one tells where all of them cross others.
     prints = footprints(vertices, faces, edges, np.flatnonzero(turning))
-    stacked = _overlapping(plane, edges, _in_one_cell(vertices, edges, prints.first))
-    far = prints.combined(*_meeting(plane, edges, *stacked)[:2])
-    near = _overlapping(plane, edges, _in_one_star(faces, edges, turning))
-    one, other = np.concatenate([far, near], axis=1)
-    one, other, share, other_share = _meeting(plane, edges, one, other)
-    ends, other_ends = vertices[edges[one], 2], vertices[edges[other], 2]
-    height = ends[:, 0] * (1.0 - share) + ends[:, 1] * share
-    other_height = other_ends[:, 0] * (1.0 - other_share) + other_ends[:, 1] * other_share
+    boxes = Boxes(ends)
+    stacked = combinations(_in_one_cell(vertices, edges, prints.first), len(edges), boxes.near)
+    far = prints.combined(*meeting(ends, *stacked)[:2])
+    begin, end = np.ascontiguousarray(edges.T)
+
+    def apart(one: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.int64]:
+        # What shares a vertex does not cross.
+        near = boxes.near(one, other)
+        one, other = one[near], other[near]
+        a, b, c, d = begin[one], end[one], begin[other], end[other]
+        return np.asarray(near[(a != c) & (a != d) & (b != c) & (b != d)])
+
+    near = combinations(_in_one_star(faces, edges, turning), len(edges), apart)
+    one, other, share, other_share = meeting(ends, *np.concatenate([far, near], axis=1))
+    heights, other_heights = vertices[edges[one], 2], vertices[edges[other], 2]
+    height = heights[:, 0] * (1.0 - share) + heights[:, 1] * share
+    other_height = other_heights[:, 0] * (1.0 - other_share) + other_heights[:, 1] * other_share
     pairs = Pairs.sorted_by(
         height > other_height,
         (edges[one][:, [0, 1, 1]], _weights(share)),
@@ -137,7 +142,7 @@ def silhouette_pairs(
 def _in_one_cell(
     vertices: NDArray[np.float64], edges: NDArray[np.int64], chosen: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """Find chosen edges that pass through one cell of a raster: their numbers, (2, q), some twice."""
+    """Find the cells of a raster through which chosen edges pass: keys of `combinations`, some twice."""
     low = vertices[:, :2].min(axis=0)
     extent = float(np.ptp(vertices[:, :2], axis=0).max())
     cells = int(np.clip(2.0 * np.sqrt(len(chosen)), _FEWEST_CELLS, _MOST_CELLS))
@@ -148,7 +153,7 @@ def _in_one_cell(
     number = np.arange(len(edge)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
     step = ((end - begin) / pieces[:, None])[edge]
     first = begin[edge] + step * number[:, None]
-    margin = min(_CLEAR * cells / max(extent, 1e-30), (1.0 - _PIECE) / 2.0)
+    margin = min(CLEAR * cells / max(extent, 1e-30), (1.0 - _PIECE) / 2.0)
     least = np.floor(np.minimum(first, first + step) - margin).astype(np.int64)
     most = np.floor(np.maximum(first, first + step) + margin).astype(np.int64)
     keys = []
@@ -157,102 +162,42 @@ def _in_one_cell(
         inside = (cell[:, 0] <= most[:, 0]) & (cell[:, 1] <= most[:, 1])
         place = (cell[inside, 0] + 1) * (cells + 3) + cell[inside, 1] + 1
         keys.append(place * len(edges) + chosen[edge[inside]])
-    return _within(np.concatenate(keys), len(edges))
+    return np.concatenate(keys)
 
 
 def _in_one_star(
     faces: NDArray[np.int64], edges: NDArray[np.int64], turning: NDArray[np.bool_]
 ) -> NDArray[np.int64]:
-    """Find edges around a vertex of a silhouette that share no vertex: their numbers, (2, q), some twice."""
+    """Find the edges of the faces around each vertex of a silhouette: keys of `combinations`, some twice."""
     n = int(faces.max(initial=0)) + 1
     at_turning = np.zeros(n, dtype=bool)
     at_turning[edges[turning]] = True
     a, b, c = faces.T
-    around = faces[at_turning[a] | at_turning[b] | at_turning[c]]
+    around = faces.compress(at_turning[a] | at_turning[b] | at_turning[c], axis=0)
     start = np.ascontiguousarray(around.T)
     end = start[[1, 2, 0]]
-    number = np.searchsorted(
-        edges[:, 0] * n + edges[:, 1], np.minimum(start, end) * n + np.maximum(start, end)
-    )
+    number = _numbers(edges, n, np.minimum(start, end).ravel(), np.maximum(start, end).ravel()).reshape(3, -1)
     keys = []
     for corner in start:
-        chosen = at_turning[corner]
-        keys.append(corner[chosen] * len(edges) + number[:, chosen])
-    both = _within(np.concatenate(keys, axis=1).ravel(), len(edges))
-    # What shares a vertex does not cross, and is half of it.
-    begin, end = np.ascontiguousarray(edges.T)
-    apart = np.zeros(both.shape[1], dtype=bool)
-    for block in range(0, both.shape[1], _BLOCK):
-        one, other = both[:, block : block + _BLOCK]
-        a, b, c, d = begin[one], end[one], begin[other], end[other]
-        apart[block : block + _BLOCK] = (a != c) & (a != d) & (b != c) & (b != d)
-    return both.compress(apart, axis=1)
+        chosen = np.flatnonzero(at_turning[corner])
+        keys.append((corner[chosen] * len(edges) + number[:, chosen]).ravel())
+    return np.concatenate(keys)
 
 
-def _within(keys: NDArray[np.int64], n: int) -> NDArray[np.int64]:
-    """Combine the members of each group with each other; keys are n times the group plus the member."""
-    keys = np.sort(keys)
-    group, member = np.divmod(keys[np.diff(keys, prepend=-1) > 0], max(n, 1))
-    start = np.flatnonzero(np.diff(group, prepend=-1))
-    count = np.diff(np.append(start, len(group)))
-    later = np.repeat(start + count, count) - np.arange(len(group)) - 1
-    one = np.repeat(np.arange(len(group)), later)
-    other = one + 1 + np.arange(len(one)) - np.repeat(np.cumsum(later) - later, later)
-    return np.stack([member[one], member[other]])
-
-
-def _overlapping(
-    plane: NDArray[np.float64], edges: NDArray[np.int64], both: NDArray[np.int64]
+def _numbers(
+    edges: NDArray[np.int64], n: int, low: NDArray[np.int64], high: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """Choose the edges whose boxes in the picture overlap or touch: their numbers, (2, q)."""
-    used = np.zeros(len(edges), dtype=bool)
-    used[both] = True
-    begin, end = (plane.take(tip, axis=0) for tip in edges[used].T)
-    number = np.cumsum(used, dtype=np.int32) - 1
-    box = np.concatenate([np.minimum(begin, end), -np.maximum(begin, end)], axis=1)
-    turned = np.ascontiguousarray(box[:, [2, 3, 0, 1]])
-    near = np.zeros(both.shape[1], dtype=bool)
-    for block in range(0, both.shape[1], _BLOCK):
-        one, other = number[both[:, block : block + _BLOCK]]
-        beyond = box.take(one, axis=0)
-        beyond += turned.take(other, axis=0)
-        x, y, back_x, back_y = (beyond <= _CLEAR).T
-        near[block : block + _BLOCK] = x & y & back_x & back_y
-    return both.compress(near, axis=1)
-
-
-def _meeting(
-    plane: NDArray[np.float64],
-    edges: NDArray[np.int64],
-    one: NDArray[np.int64],
-    other: NDArray[np.int64],
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """Choose the edges that cross in the picture, each two once; return where, as shares of both."""
-    shares: list[NDArray[np.float64]] = []
-    for _ in (0, 1):
-        first, second = _sides(plane, edges, one, other)
-        apart = np.flatnonzero(first * second < 0.0)
-        one, other, first, second = one[apart], other[apart], first[apart], second[apart]
-        direction = plane[edges[other, 1]] - plane[edges[other, 0]]
-        clear = np.minimum(np.abs(first), np.abs(second)) > _CLEAR * np.linalg.norm(direction, axis=1)
-        shares = [(before[apart])[clear] for before in shares] + [(first / (first - second))[clear]]
-        one, other = other[clear], one[clear]
-    _, once = np.unique(one * len(edges) + other, return_index=True)
-    return one[once], other[once], shares[0][once], shares[1][once]
-
-
-def _sides(
-    plane: NDArray[np.float64],
-    edges: NDArray[np.int64],
-    one: NDArray[np.int64],
-    other: NDArray[np.int64],
-) -> list[NDArray[np.float64]]:
-    """Return on which side of other edges both ends of some lie: twice the area of the triangle."""
-    x, y = np.ascontiguousarray(plane.T)
-    begin, end = edges[other].T
-    origin_x, origin_y = x[begin], y[begin]
-    along_x, along_y = x[end] - origin_x, y[end] - origin_y
-    return [along_x * (y[tip] - origin_y) - along_y * (x[tip] - origin_x) for tip in edges[one].T]
+    """Return the numbers of edges between vertices, (q,) each, of which the one is lower than the other."""
+    count = np.bincount(edges[:, 0], minlength=n)
+    last = np.cumsum(count)
+    number, beyond = (last - count)[low], last[low]
+    ends = np.ascontiguousarray(edges[:, 1])
+    for _ in range(int(count.max(initial=0)).bit_length()):
+        middle = (number + beyond) >> 1
+        # Where both are the same the search is over; the last edge of all has none behind it.
+        less = (ends[np.minimum(middle, len(ends) - 1)] < high) & (middle < beyond)
+        number, beyond = np.where(less, middle + 1, number), np.where(less, beyond, middle)
+    return number
 
 
 def _weights(share: NDArray[np.float64]) -> NDArray[np.float64]:

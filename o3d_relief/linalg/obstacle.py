@@ -27,6 +27,9 @@ _STEPS = 4
 _ROUGH = 12
 """Rounds from which on all are solved exactly: where most unknowns end on bounds, a few steps may not do."""
 
+_LOWEST_FIRST = 3
+"""Rounds after which only what is lowest around is held: at first, all that is below is far too much."""
+
 _ROUNDS = 40
 
 
@@ -107,7 +110,7 @@ def minimise_above(
             rounds += 1
             below = ~held & (x < lowest - _BELOW)
             released = held & (matrix @ x < pull)
-            if rounds == 1:
+            if rounds <= _LOWEST_FIRST:
                 # Most of what is below comes up with the lowest ones.
                 below = _lowest_around(similar, np.where(below, lowest - x, 0.0))
             if rounds > _ROUNDS:
