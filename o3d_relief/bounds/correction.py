@@ -198,7 +198,7 @@ class Correction:
         self, numbers: NDArray[np.int64], start: NDArray[np.int64], most: NDArray[np.float64]
     ) -> NDArray[np.bool_]:
         """Tell which vertices are no further from the nearest of some than `most` (n,) says there."""
-        distance, nearest = cKDTree(self._vertices[start]).query(
+        distance, nearest = cKDTree(self._vertices[start], balanced_tree=False, compact_nodes=False).query(
             self._vertices[numbers], distance_upper_bound=most[start].max()
         )
         found: NDArray[np.bool_] = np.isfinite(distance)
@@ -220,9 +220,9 @@ class Correction:
         reach_there = np.where(touched, np.clip(_REACH * self._size, _SHORTEST, _LONGEST), 0.0)
         fresh = np.flatnonzero(touched & (self._distance > 0.0))
         if len(fresh):
-            distance, nearest = cKDTree(self._vertices[fresh]).query(
-                self._vertices, distance_upper_bound=self._widening * _REGION * _LONGEST
-            )
+            distance, nearest = cKDTree(
+                self._vertices[fresh], balanced_tree=False, compact_nodes=False
+            ).query(self._vertices, distance_upper_bound=self._widening * _REGION * _LONGEST)
             nearer = distance < self._distance
             self._distance[nearer], self._nearest[nearer] = distance[nearer], fresh[nearest[nearer]]
         reach = np.where(self._nearest < 0, 0.0, reach_there[self._nearest])

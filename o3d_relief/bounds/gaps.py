@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from o3d_relief.bounds.pairs import Pairs
 
-__all__ = ["out_of_order", "required_gaps", "spare", "wanted_gaps", "worst_of_stacks"]
+__all__ = ["EXACT", "out_of_order", "required_gaps", "spare", "wanted_gaps", "worst_of_stacks"]
 
 _MARGIN = 0.05
 """Pairs are set this far beyond their smallest gap, or a quarter of what they have, if that is less."""
 
-_EXACT = 1e-4
+EXACT = 1e-4
 """Relief units by which a gap may miss: well below what float32 rays tell apart."""
 
 _SLACK = 0.01
@@ -41,7 +41,7 @@ def out_of_order(pairs: Pairs, z: NDArray[np.float64], *, min_gap: float = 0.0) 
         Pairs of which both points lie behind S, where they are cut off, do not count.
     """
     upper, lower = pairs.heights(z)
-    missed = upper - lower < required_gaps(pairs, min_gap) - _EXACT
+    missed = upper - lower < required_gaps(pairs, min_gap) - EXACT
     return missed & (np.maximum(upper, lower) > 0.0)
 
 

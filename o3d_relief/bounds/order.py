@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from o3d_relief.bounds.between import Between
 from o3d_relief.bounds.correction import Correction
-from o3d_relief.bounds.gaps import out_of_order, required_gaps, spare, wanted_gaps, worst_of_stacks
+from o3d_relief.bounds.gaps import EXACT, required_gaps, spare, wanted_gaps, worst_of_stacks
 from o3d_relief.bounds.pairs import Pairs
+from o3d_relief.bounds.rows import point_rows
 from o3d_relief.progress import Tick, share_of_way, silent
 
 __all__ = ["Ordered", "keep_order"]
@@ -128,7 +129,7 @@ def keep_order(
         if rounds < _FORGETFUL:
             lines.let_go(current)
             further = further.select(~spare(further, current, min_gap))
-        new = Pairs.join([lines.take_worst(current), found])
+        new = Pairs.join([lines.take_worst(), found])
         touched = behind & ~floor
         touched[new.upper] = True
         touched[new.lower] = True
@@ -147,40 +148,33 @@ class _Lines:
 
     def __init__(self, pairs: Pairs, n: int, min_gap: float) -> None:
         self._pairs, self._min_gap = pairs, min_gap
-        self._corners = np.concatenate([pairs.upper.T, pairs.lower.T])
+        self._required = required_gaps(pairs, min_gap)
+        # Two products for all pairs are faster than to look up those of which a vertex has moved.
+        self._upper = point_rows(pairs.upper, pairs.upper_weights, n)
+        self._lower = point_rows(pairs.lower, pairs.lower_weights, n)
+        self._lacking = np.zeros(len(pairs))
         self._held = np.zeros(len(pairs), dtype=bool)
         self._ever, self._again = self._held.copy(), self._held.copy()
-        self._last = np.full(n, np.nan)
-        self.wrong = np.zeros(len(pairs), dtype=bool)
+        self.wrong = self._held.copy()
 
     @property
     def held(self) -> Pairs:
         return self._pairs.select(self._held)
 
     def look_at(self, z: NDArray[np.float64]) -> None:
-        """Find what is wrong now; only pairs of which a vertex has moved can have changed."""
-        moved = z != self._last
-        self._last = z
-        if moved.all():
-            self.wrong = out_of_order(self._pairs, z, min_gap=self._min_gap)
-            return
-        of_moved = np.zeros(len(self._pairs), dtype=bool)
-        for corner in self._corners:
-            of_moved |= moved[corner]
-        changed = np.flatnonzero(of_moved)
-        self.wrong[changed] = out_of_order(self._pairs.select(changed), z, min_gap=self._min_gap)
+        """Find what is wrong now."""
+        upper, lower = self._upper @ z, self._lower @ z
+        self._lacking = self._required - (upper - lower)
+        self.wrong = (self._lacking > EXACT) & (np.maximum(upper, lower) > 0.0)
 
     def let_go(self, z: NDArray[np.float64]) -> None:
         """Hold no longer what has room to spare."""
         self._held[self._held] = ~spare(self.held, z, self._min_gap)
         self._held |= self._again
 
-    def take_worst(self, z: NDArray[np.float64]) -> Pairs:
+    def take_worst(self) -> Pairs:
         """Hold the worst of the wrong pairs, too; return those that were not held before."""
-        lacking = np.zeros(len(self._pairs))
-        wrong = self._pairs.select(self.wrong)
-        lacking[self.wrong] = required_gaps(wrong, self._min_gap) - np.subtract(*wrong.heights(z))
-        new = worst_of_stacks(self._pairs, lacking, self.wrong) & ~self._held
+        new = worst_of_stacks(self._pairs, self._lacking, self.wrong) & ~self._held
         self._again |= new & self._ever
         self._held |= new
         self._ever |= new

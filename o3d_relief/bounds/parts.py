@@ -219,7 +219,9 @@ def _nearest_outside(
         return np.zeros((0, 2), dtype=np.int64)
     largest = np.bincount(group).argmax()
     home, away = np.flatnonzero(group == largest), np.flatnonzero(group != largest)
-    distance, nearest = cKDTree(vertices[home]).query(vertices[away])
+    distance, nearest = cKDTree(vertices[home], balanced_tree=False, compact_nodes=False).query(
+        vertices[away]
+    )
     order = np.lexsort((distance, group[away]))
     _, first = np.unique(group[away][order], return_index=True)
     chosen = order[first]

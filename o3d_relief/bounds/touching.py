@@ -35,23 +35,40 @@ def touching_pairs(
     box = UnitBox(vertices, faces)
     candidates = _near_other_parts(vertices, label, reach)
     found = []
+    middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
     for axis in np.eye(3):
-        hits = box.scene.list_intersections(box.rays(vertices[candidates] - reach * axis, axis))
-        off = hits["t_hit"].numpy().astype(np.float64) * box.size - reach
-        vertex = candidates[hits["ray_ids"].numpy().astype(np.int64)]
-        other = faces[hits["primitive_ids"].numpy().astype(np.int64)]
-        near = (np.abs(off) <= reach) & (label[vertex] != label[other[:, 0]])
-        own, own_weights = as_points(vertex[near])
-        found.append(
-            Pairs(
-                upper=own,
-                upper_weights=own_weights,
-                lower=other[near],
-                lower_weights=weights_of(hits["primitive_uvs"].numpy()[near]),
-                gap=np.abs(off[near]),
-            )
-        )
+        # Lists hold all that a ray meets: it comes from the middle, and so leaves the scene soon.
+        outwards = vertices[candidates] @ axis > middle @ axis
+        for direction, some in ((axis, candidates[outwards]), (-axis, candidates[~outwards])):
+            if len(some):  # Open3D dies of a list without rays
+                found.append(_within_reach(box, vertices, faces, label, some, direction, reach))
     return Pairs.join(found)
+
+
+def _within_reach(
+    box: UnitBox,
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    label: NDArray[np.int32],
+    candidates: NDArray[np.int64],
+    direction: NDArray[np.float64],
+    reach: float,
+) -> Pairs:
+    """Pair some vertices with the surfaces of other parts within reach along one direction and against it."""
+    hits = box.scene.list_intersections(box.rays(vertices[candidates] - reach * direction, direction))
+    off = hits["t_hit"].numpy().astype(np.float64) * box.size - reach
+    near = np.flatnonzero(np.abs(off) <= reach)
+    vertex = candidates[hits["ray_ids"].numpy()[near].astype(np.int64)]
+    other = faces[hits["primitive_ids"].numpy()[near].astype(np.int64)]
+    elsewhere = label[vertex] != label[other[:, 0]]
+    near, own = near[elsewhere], as_points(vertex[elsewhere])
+    return Pairs(
+        upper=own[0],
+        upper_weights=own[1],
+        lower=other[elsewhere],
+        lower_weights=weights_of(hits["primitive_uvs"].numpy()[near]),
+        gap=np.abs(off[near]),
+    )
 
 
 def _near_other_parts(
