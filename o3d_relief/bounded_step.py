@@ -60,13 +60,13 @@ def bounded_step(
     seen = point_rows(faces, face[partly], share[partly], n)
     lowest = lowest_seen(z, seen, visible)
     deep = float(z.max()) - lowest
-    wanted = cast(float, params.depth) / scene.unit
-    weight = kept * face_weights(vertices, faces, in_front, wanted / max(deep, wanted))
-    if deep <= wanted:
+    depth = cast(float, params.depth) / scene.unit
+    weight = kept * face_weights(vertices, faces, in_front, depth / max(deep, depth))
+    if deep <= depth:
         shallow = {"already_shallower": 1, "attached_missed": int((z[attached] > lowest).sum())}
         return BoundedStage(face_weight=weight, attached=attached, z=on_plane(z - lowest), counts=shallow)
 
-    depth = _wanted_depth(scene, params)
+    _check_depth(depth, scene.unit)
     form, slivers = cotangent_laplacian(vertices, faces, weights=weight)
     middle = (float(z.max()) + lowest) / 2.0
     pull = side_pull(vertices, faces, middle + (z - middle) * (depth / deep), in_front, kept)
@@ -122,15 +122,13 @@ def _stacked(
     return Pairs.join([stacked, silhouette_pairs(vertices, faces), grid])
 
 
-def _wanted_depth(scene: SceneStage, params: ReliefParams) -> float:
-    """Return the depth in relief units."""
-    wanted = cast(float, params.depth)
-    if wanted < _SHALLOWEST * scene.unit:
+def _check_depth(depth: float, unit: float) -> None:
+    """Check that a depth in relief units can be told from none."""
+    if depth < _SHALLOWEST:
         raise ParameterError(
-            f"depth must be at least {_SHALLOWEST * scene.unit:.3g} for this scene, 1/100,000 of its width "
-            f"or height: less cannot be told from none. Got {wanted:.3g} instead."
+            f"depth must be at least {_SHALLOWEST * unit:.3g} for this scene, 1/100,000 of its width "
+            f"or height: less cannot be told from none. Got {depth * unit:.3g} instead."
         )
-    return wanted / scene.unit
 
 
 def _attached(scene: SceneStage, params: ReliefParams) -> NDArray[np.int64]:
