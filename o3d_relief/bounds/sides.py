@@ -21,10 +21,10 @@ __all__ = ["SIDES", "shown_normals", "side_pull", "smooth_pull", "tilt_pull", "v
 SIDES = ((-40.0, 0.0), (-20.0, 0.0), (20.0, 0.0), (40.0, 0.0), (0.0, -20.0), (0.0, 20.0))
 """The views from the side, degrees to the right and above."""
 
-_SHARE, _MOST = 0.5, 1.2
+_SHARE, _MOST = 0.5, 0.8
 """How much the six views together count against the one from the front: at least, and at most."""
 
-_DEEPER = 5.0
+_DEEPER = 3.2
 """In between, so many times the relief's share of the scene's depth: a deep one has normals to give away."""
 
 _WIDTH = 5.0
