@@ -69,7 +69,7 @@ def bounded_step(
     _check_depth(depth, scene.unit)
     form, slivers = cotangent_laplacian(vertices, faces, weights=weight)
     middle = (float(z.max()) + lowest) / 2.0
-    pull = side_pull(vertices, faces, middle + (z - middle) * (depth / deep), in_front, kept)
+    pull = side_pull(vertices, faces, middle + (z - middle) * (depth / deep), in_front, kept, depth / deep)
     tick(_PULLED)
     lines = Lines(vertices, faces)
     stacked = vertex_pairs(lines)

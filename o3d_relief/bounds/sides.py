@@ -21,8 +21,11 @@ __all__ = ["SIDES", "shown_normals", "side_pull", "smooth_pull", "tilt_pull", "v
 SIDES = ((-40.0, 0.0), (-20.0, 0.0), (20.0, 0.0), (40.0, 0.0), (0.0, -20.0), (0.0, 20.0))
 """The views from the side, degrees to the right and above."""
 
-_SHARE = 0.5
-"""How much the six views together count against the one from the front."""
+_SHARE, _MOST = 0.5, 0.8
+"""How much the six views together count against the one from the front: at least, and at most."""
+
+_DEEPER = 3.2
+"""In between, so many times the relief's share of the scene's depth: a deep one has normals to give away."""
 
 _WIDTH = 5.0
 """Relief units over which what the views ask for is evened out. Finer, a relief shows its details twice."""
@@ -40,6 +43,7 @@ def side_pull(
     heights: NDArray[np.float64],
     seen: NDArray[np.bool_],
     weights: NDArray[np.float64],
+    depth_share: float,
 ) -> NDArray[np.float64]:
     """Return what pulls a relief towards what views from the side see of the scene.
 
@@ -55,6 +59,8 @@ def side_pull(
         Faces that are seen from the front.
     weights : (m,) float64
         How much each face counts, 1 is ordinary.
+    depth_share : float
+        Depth of the relief, as a share of that of the scene.
 
     Returns
     -------
@@ -63,7 +69,9 @@ def side_pull(
         sum over each component is 0.
     """
     normals = shown_normals(vertices, faces, heights, np.flatnonzero(seen & (weights > 0.0)))
-    pull = _SHARE * tilt_pull(vertices, faces, normals * weights[:, None])
+    pull = min(max(_DEEPER * depth_share, _SHARE), _MOST) * tilt_pull(
+        vertices, faces, normals * weights[:, None]
+    )
     form, _ = cotangent_laplacian(vertices, faces, weights=weights)
     return smooth_pull(form, vertex_masses(vertices, faces, weights), pull, _WIDTH)
 

@@ -88,12 +88,22 @@ def test_what_does_not_count_is_not_pulled():
     vertices, faces = bust()
     seen = normals_of(vertices, faces)[:, 2] > 0.0
     weights = np.where(vertices[faces, 1].mean(axis=1) > 0.0, 1.0, 0.0)
-    pull = side_pull(vertices, faces, 0.2 * vertices[:, 2], seen, weights)
+    pull = side_pull(vertices, faces, 0.2 * vertices[:, 2], seen, weights, 0.2)
     idle = np.ones(len(vertices), dtype=bool)
     idle[faces[weights > 0.0]] = False
     assert idle.any()
     assert (pull[idle] == 0.0).all()
     assert np.abs(pull[~idle]).max() > 0.0
+
+
+def test_a_deeper_relief_leans_more_within_limits():
+    vertices, faces = bust()
+    seen, weights = normals_of(vertices, faces)[:, 2] > 0.0, np.ones(len(faces))
+    sizes = [
+        np.linalg.norm(side_pull(vertices, faces, 0.2 * vertices[:, 2], seen, weights, share))
+        for share in (0.05, 0.1, 0.2, 0.5, 0.9)
+    ]
+    assert np.array(sizes) / sizes[0] == pytest.approx([1.0, 1.0, 1.28, 1.6, 1.6])
 
 
 def test_views_from_the_side_gain_and_the_front_hardly_loses(monkeypatch):
