@@ -50,11 +50,24 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     if getattr(options, "params", None) is None:
         return options
     params, view = load_params(options.params)
-    return _parser(field_values(params) | field_values(view)).parse_args(words)
+    replaced = field_values(params) | field_values(view)
+    deep, squeezed = (_given(options, names) for names in (("depth", "depth_mm"), ("alpha", "alpha_min")))
+    if deep and not squeezed:  # in place of what the file says, not beside it
+        replaced |= {"alpha": None, "alpha_min": None}
+    if squeezed and not deep:
+        replaced |= {"depth": None}
+    return _parser(replaced).parse_args(words)
+
+
+def _given(options: argparse.Namespace, names: Sequence[str]) -> bool:
+    return any(getattr(options, name, None) is not None for name in names)
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser that says what is wrong in one sentence."""
+    """A parser that takes whole words only, and says what is wrong in one sentence."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options, allow_abbrev=False)
 
     def error(self, message: str) -> NoReturn:
         sys.stderr.write(f"{self.prog}: error: {message} (see {self.prog} --help)\n")
@@ -80,7 +93,7 @@ def _join_points(arguments: list[str]) -> list[str]:
 
 def _parser(replaced: dict[str, Any]) -> argparse.ArgumentParser:
     """Build the parser; `replaced` holds values in place of the defaults of the commands."""
-    parser = _Parser(prog="o3d-relief", description="Make high reliefs from 3D scenes.", allow_abbrev=False)
+    parser = _Parser(prog="o3d-relief", description="Make high reliefs from 3D scenes.")
     parser.add_argument("--version", action="version", version=f"o3d-relief {__version__}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND", dest="command")
 

@@ -80,8 +80,8 @@ def tell_result(path: Path, relief: Relief, seconds: float, *, solids: Sequence[
     counts = {name: count for record in relief.stages.values() for name, count in record.counts.items()}
     if counts.get("already_shallower"):
         tell(
-            f"the relief is {report['relief_depth']:.4g} deep, in the unit of the file, less than was asked "
-            "for: it is not stretched (millimetres: --width-mm and --depth-mm)"
+            f"the relief is {report['relief_depth']:.4g} deep, in the unit of the file, not more than it was "
+            "before: it is not stretched (millimetres: --width-mm and --depth-mm)"
         )
     if left := counts.get("left", 0):
         if relief.params.bounded:
@@ -102,5 +102,6 @@ def tell_result(path: Path, relief: Relief, seconds: float, *, solids: Sequence[
         return
     tell(
         f"{path}: {report['vertices']} vertices, {report['triangles']} triangles; "
-        f"depth {report['scene_depth']:.4g} -> {report['relief_depth']:.4g}, {seconds:.1f} s in all"
+        f"depth that is seen {report['scene_visible_depth']:.4g} -> {report['relief_visible_depth']:.4g}, "
+        f"{seconds:.1f} s in all"
     )

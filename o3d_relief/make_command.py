@@ -12,7 +12,6 @@ from o3d_relief.console import tell, tell_result, tell_stage, tell_unused, write
 from o3d_relief.errors import FileError, MeshError, ParameterError, ReliefError
 from o3d_relief.files import check_exists, check_place
 from o3d_relief.plate_arguments import chosen_plate
-from o3d_relief.plate_params import PlateParams
 from o3d_relief.relief_arguments import chosen_params, chosen_view
 from o3d_relief.scan_arguments import chosen_scan
 from o3d_relief.scan_params import ScanParams
@@ -73,7 +72,7 @@ def make(options: argparse.Namespace) -> int:
             scanned = scan_points(scene, meshing, view=view, on_stage=tell_stage, on_progress=bar)
             scene, meshing = scanned.mesh, None
         if options.dry_run:
-            tell_estimate(scene, params, view, plate or PlateParams(), tell, field=options.undercut_free)
+            tell_estimate(scene, params, view, plate, tell, field=options.undercut_free)
             return 0
         if plate is not None and plate.depth_mm is not None:
             params = replace(params, depth=relief_depth(scene, view, plate))

@@ -98,7 +98,7 @@ def tell_estimate(
     mesh: o3d.geometry.TriangleMesh,
     params: ReliefParams,
     view: View,
-    plate: PlateParams,
+    plate: PlateParams | None,
     tell: Tell,
     *,
     field: bool = False,
@@ -110,17 +110,20 @@ def tell_estimate(
     mesh : open3d.geometry.TriangleMesh
     params : ReliefParams
     view : View
-    plate : PlateParams
+    plate : PlateParams or None
+        None where only a relief is wanted: told is what a solid with the defaults would measure.
     tell : callable
         Takes a line.
     field : bool
         Whether it becomes a height field, whose triangles are as many as its pixels are small.
     """
-    found = estimate_solid(mesh, params, view, plate)
+    found = estimate_solid(mesh, params, view, PlateParams() if plate is None else plate)
     x, y, z = found.size_mm
-    tell(f"seen      {found.visible_depth:.4g} deep, in the unit of the file: 100% of --depth")
+    tell(f"seen      {found.visible_depth:.4g} deep, in the unit of the file; --depth 100% is all of it")
     depth = f"{z:.2f}" if found.depth_known else f"at most {z:.2f}"
-    tell(f"size      {x:.2f} x {y:.2f} x {depth} mm")
+    as_solid = " as a solid of that width (--width-mm); without, a surface in the unit of the file"
+    as_solid = as_solid if plate is None else ""
+    tell(f"size      {x:.2f} x {y:.2f} x {depth} mm{as_solid}")
     tell(f"volume    {'about' if found.depth_known else 'at most'} {found.volume_mm3 / 1000.0:.0f} cm3")
     finer = ", more where textures become colours" if mesh.has_textures() else ""
     finer += ", more in a height field" if field else ""

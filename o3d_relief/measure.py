@@ -21,6 +21,7 @@ from o3d_relief.bounds.grid import grid_pairs
 from o3d_relief.bounds.lines import Lines
 from o3d_relief.bounds.pairs import Pairs, vertex_pairs
 from o3d_relief.errors import ParameterError
+from o3d_relief.relief import Relief
 from o3d_relief.scene.convert import arrays_mesh, mesh_arrays
 from o3d_relief.scene.frame import RELIEF_UNITS
 from o3d_relief.show.shots import Body, discontinuities, normal_angle, overlap
@@ -244,7 +245,7 @@ class Yardstick:
 
 def measure_relief(
     scene: Surface,
-    relief: Surface,
+    relief: Surface | Relief,
     *,
     heights: NDArray[np.float64] | None = None,
     similarity: bool = False,
@@ -253,13 +254,32 @@ def measure_relief(
 ) -> ReliefQuality:
     """Measure how much a relief keeps of its scene, see `Yardstick`.
 
+    Parameters
+    ----------
+    scene : TriangleMesh, or vertices (n, 3) float64 and faces (m, 3) int64
+        As it was given to `make_relief` where `relief` is a `Relief`; else it must lie in the relief frame,
+        as the relief does: ``scene.transform(np.linalg.inv(relief.to_scene))``.
+    relief : Relief, or a surface as `scene`
+    heights, similarity
+        See `Yardstick.measure`.
+    views, size
+        See `Yardstick`.
+
+    Returns
+    -------
+    ReliefQuality
+
     Examples
     --------
-    >>> import open3d as o3d
     >>> ball = o3d.geometry.TriangleMesh.create_sphere()
     >>> measure_relief(ball, ball, size=64).silhouette_overlaps[0]
     1.0
     """
+    if isinstance(relief, Relief):
+        vertices, faces = mesh_arrays(arrays_mesh(*scene) if isinstance(scene, tuple) else scene)
+        to_relief = np.linalg.inv(relief.to_scene)
+        scene = vertices @ to_relief[:3, :3].T + to_relief[:3, 3], faces
+        relief = relief.mesh
     return Yardstick(scene, views=views, size=size).measure(relief, heights=heights, similarity=similarity)
 
 

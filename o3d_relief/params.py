@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from o3d_relief.errors import ParameterError
@@ -189,7 +189,7 @@ class ReliefParams:
     in_order: bool = True
     min_gap: float = 0.0
     attach: Sequence[int] = ()
-    weights: Sequence[float] | None = None
+    weights: Sequence[float] | None = field(default=None, repr=False)
     seed: int = 0
     point_edits: Sequence[PointEdit] = ()
 

@@ -108,7 +108,14 @@ def add_params(command: argparse.ArgumentParser) -> None:
         help="a parameter file, for the view, too; options beside it override what it says")  # fmt: skip
     add("--mode", choices=("attenuation", "bounded"),
         help="the paper's method, or the closest relief of a depth (default: with --depth)")  # fmt: skip
-    add("-k", type=int, default=default.k, metavar="N", help="attenuation points (default: %(default)s)")
+    add(
+        "-k",
+        "--k",
+        type=int,
+        default=default.k,
+        metavar="N",
+        help="attenuation points (default: %(default)s)",
+    )
     add("--beta", type=_beta, default=default.beta, metavar="B[,B...]",
         help="attenuation factor, one or one per point (default: %(default)s)")  # fmt: skip
     for name, text in (

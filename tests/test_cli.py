@@ -150,13 +150,38 @@ def test_a_parameter_file_is_replayed_exactly(tmp_path, scene):
     assert values["view"]["front"] == [0, 0, 1]
 
 
+def test_a_depth_beside_a_file_takes_the_place_of_its_alpha(tmp_path, scene):
+    file, out, report = tmp_path / "params.json", tmp_path / "r.ply", tmp_path / "report.json"
+    words = ["make", str(scene), str(out), "--params", str(file), "--report", str(report)]
+    for given, beside, left in (
+        (
+            '{"alpha": 0.5, "alpha_min": 0.3}',
+            ["--depth", "3"],
+            {"depth": 3.0, "alpha": None, "alpha_min": None},
+        ),
+        ('{"depth": "20%", "k": 30}', ["--alpha", "0.5"], {"depth": None, "alpha": 0.5, "k": 30}),
+    ):
+        file.write_text(f'{{"params": {given}}}')
+        assert main([*words, *beside]) == 0
+        params = json.loads(report.read_text())["params"]
+        assert {name: params[name] for name in left} == left
+
+
+def test_options_are_not_abbreviated(tmp_path, scene, capsys):
+    with pytest.raises(SystemExit):
+        main(["make", str(scene), str(tmp_path / "r.ply"), "--dept", "3"])
+    assert "unrecognized arguments: --dept" in capsys.readouterr().err
+    assert main(["make", str(scene), str(tmp_path / "r.ply"), "--k=12"]) == 0
+
+
 def test_parameter_files_that_cannot_be_used(tmp_path, scene, capsys):
     file, out = tmp_path / "params.json", tmp_path / "r.ply"
     assert "does not exist" in _fails(capsys, "make", scene, out, "--params", file)
     file.write_text('{"params": {"kk": 3}}')
     assert "'kk' is not known in params" in _fails(capsys, "make", scene, out, "--params", file)
     file.write_text('{"params": {"alpha": 0.5}}')
-    assert "exclude each other" in _fails(capsys, "make", scene, out, "--params", file, "--depth", "3")
+    both = ("--depth", "3", "--alpha", "0.4")
+    assert "exclude each other" in _fails(capsys, "make", scene, out, "--params", file, *both)
     assert "is the parameter file" in _fails(capsys, "make", scene, file, "--params", file)
     assert "is the parameter file" in _fails(capsys, "make", scene, out, "--params", file, "--report", file)
     assert _files(tmp_path) == ["params.json", "scene.ply"]
@@ -208,7 +233,7 @@ def test_a_depth_alone_means_the_bounded_mode(tmp_path, scene, capsys):
     assert np.asarray(read_mesh(out).vertices)[:, 2].max() == pytest.approx(15.0)
     assert values["certificate"]["failures"] == []
     assert main([*words[:3], "--depth", "1e6"]) == 0
-    assert "less than was asked for" in capsys.readouterr().err
+    assert "it is not stretched" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("mode", ["bounded", "attenuation"])
@@ -242,7 +267,7 @@ def test_deeper_than_it_is(tmp_path, scene, capsys):
         )
         == 0
     )
-    assert "less than was asked for" in capsys.readouterr().err
+    assert "it is not stretched" in capsys.readouterr().err
 
 
 def test_a_mesh_error_names_the_file(tmp_path, scene, capsys):

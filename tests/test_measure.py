@@ -3,8 +3,10 @@ import sys
 import numpy as np
 import pytest
 
+from o3d_relief import ReliefParams, View, make_relief
 from o3d_relief.errors import MeshError, ParameterError, ReliefError
 from o3d_relief.measure import SEVEN_VIEWS, ReliefQuality, Yardstick, measure_relief
+from o3d_relief.scene.convert import arrays_mesh
 from shapes import bust, exploded, grid, hills, joined, moved, sphere, to_mesh
 
 FRONT = ((0.0, 0.0),)
@@ -219,3 +221,15 @@ def test_quality_is_frozen(ball):
     assert isinstance(quality, ReliefQuality)
     with pytest.raises(AttributeError):
         quality.depth = 1.0
+
+
+def test_a_relief_is_laid_over_its_scene():
+    mesh = arrays_mesh(*plates(20.0))
+    mesh.rotate(mesh.get_rotation_matrix_from_xyz((np.pi / 2, 0.0, 0.0)), (0, 0, 0)).translate((300, 7, -40))
+    relief = make_relief(mesh, ReliefParams(depth="50%"), view=View(front="-y", up="z"))
+    quality = measure_relief(mesh, relief, views=FRONT, size=64)
+    assert quality.silhouette_overlaps == pytest.approx((1.0,), abs=1e-3)
+    assert quality.normal_angles[0] < 1.0
+    placed = type(mesh)(mesh).transform(np.linalg.inv(relief.to_scene))
+    same = measure_relief(placed, relief.mesh, views=FRONT, size=64)
+    assert same.normal_angles == pytest.approx(quality.normal_angles, abs=1e-6)

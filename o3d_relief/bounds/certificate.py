@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,7 +70,7 @@ class Certificate:
     faces_elsewhere: int
     bend_near_points: float
     bend_elsewhere: float
-    places: tuple[Place, ...]
+    places: tuple[Place, ...] = field(repr=False)
 
     @property
     def failures(self) -> list[str]:

@@ -170,14 +170,14 @@ def gap_places(
         elif stacked * (min_gap - _TOUCH) > depth:
             reasons.append(
                 f"the gaps asked for there, {stacked} x {min_gap:.3g} = {stacked * min_gap:.3g}, do not fit "
-                f"into the relief's depth of {depth:.3g}"
+                f"into the relief's depth of {depth:.3g} (relief units)"
             )
         elif meet[i]:
             reasons.append(_MEET)
         elif scaled[i] < min_gap:
             reasons.append(
                 f"if all depths shrank alike to the relief's, {scaled[i]:.3g} would be left of the "
-                f"{min_gap:.3g} asked for"
+                f"{min_gap:.3g} asked for (relief units)"
             )
         else:
             reasons.append("")

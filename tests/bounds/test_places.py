@@ -65,7 +65,10 @@ def test_reasons_for_gaps_in_a_deep_relief():
     assert {place.reason for place in places} == {"their surfaces are one sheet and meet right beside"}
     scene, faces = joined(grid(11), moved(grid(3, size=9), (0, 0, 4)), moved(grid(3, size=9), (30, 0, 90)))
     (reason,) = {place.reason for place in _gaps(scene, faces, scene * [1, 1, 0.5], 3.0)}
-    assert reason == "if all depths shrank alike to the relief's, 2 would be left of the 3 asked for"
+    assert (
+        reason
+        == "if all depths shrank alike to the relief's, 2 would be left of the 3 asked for (relief units)"
+    )
     squeezed = np.where(scene[:, 2:] < 50, scene * [1, 1, 0.5], scene)
     assert {place.reason for place in _gaps(scene, faces, squeezed, 3.0)} == {""}
 
