@@ -14,6 +14,9 @@ __all__ = ["last_step"]
 
 Vector = NDArray[np.float64]
 
+_TRIES = 20
+"""Looks at what the step would need further; a bust of 134,000 vertices takes two."""
+
 
 def last_step(
     path: CentralPath,
@@ -44,15 +47,15 @@ def last_step(
     """
     path.advance(least_gap)
     back = np.zeros(len(accepted), dtype=bool)
-    while True:
+    for _ in range(_TRIES):
         x = np.where(back, accepted, path.x)
         wrong = path.broken(x)
         if wrong.shape[0] == 0:
             wrong, _ = more_rows(x)
             if wrong.shape[0] == 0:
-                break
+                return x if path.objective(x) <= path.objective(accepted) else accepted
         known = int(back.sum())
         back[wrong.indices] = True
         if int(back.sum()) == known:  # what more_rows looks at has moved as a whole
-            return accepted
-    return x if path.objective(x) <= path.objective(accepted) else accepted
+            break
+    return accepted
