@@ -17,10 +17,10 @@ from PIL import Image
 import o3d_relief as rel
 from o3d_relief.scan_records import SurfaceStage
 from o3d_relief.scene.frame import relief_frame
+from o3d_relief.show.easel import Easel
 from o3d_relief.show.render import render, view_direction
 from o3d_relief.show.scan_panels import SCAN_PANELS
 from o3d_relief.show.sheets import contact_sheet
-from o3d_relief.show.stage_panels import Easel
 
 PANEL = (400, 440)
 SCANS = {

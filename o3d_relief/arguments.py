@@ -51,10 +51,10 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         return options
     params, view = load_params(options.params)
     replaced = field_values(params) | field_values(view)
-    deep, squeezed = (_given(options, names) for names in (("depth", "depth_mm"), ("alpha", "alpha_min")))
-    if deep and not squeezed:  # in place of what the file says, not beside it
+    deep, squeezed = _given(options, ("depth", "depth_mm")), _given(options, ("alpha",))
+    if deep and not squeezed and params.alpha is not None:  # in place of what the file says, not beside it
         replaced |= {"alpha": None, "alpha_min": None}
-    if squeezed and not deep:
+    if (squeezed and not deep) or _given(options, ("depth_mm",)):
         replaced |= {"depth": None}
     return _parser(replaced).parse_args(words)
 

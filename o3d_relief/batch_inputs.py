@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -35,8 +36,9 @@ def find_inputs(inputs: Sequence[str | Path]) -> list[str]:
 
     if isinstance(inputs, str | Path) or len(inputs) == 0:
         raise ParameterError(f"inputs must be a sequence of files, at least one. Got {inputs!r} instead.")
-    if not any(Path(place).exists() for place in inputs):
-        rest = "" if len(inputs) == 1 else f", nor any of the {len(inputs) - 1} others"
+    # Path.exists would raise for names that are too long.
+    if not any(os.path.exists(place) for place in inputs):  # noqa: PTH110
+        rest = "" if len(inputs) == 1 else ", nor is any other of the inputs there"
         raise FileError(f"There is no file or folder {inputs[0]}{rest}: check the name.")
     found: list[Path] = []
     for place in map(Path, inputs):

@@ -13,7 +13,8 @@ from o3d_relief.bounds.grid import grid_pairs
 from o3d_relief.bounds.lines import Lines
 from o3d_relief.bounds.pairs import Pairs, vertex_pairs
 from o3d_relief.bounds.parts import tie_parts
-from o3d_relief.bounds.seen import face_weights, point_rows, seen_faces, seen_points
+from o3d_relief.bounds.rows import point_rows
+from o3d_relief.bounds.seen import face_weights, seen_faces, seen_points
 from o3d_relief.bounds.sides import side_pull
 from o3d_relief.bounds.silhouettes import silhouette_pairs
 from o3d_relief.errors import ParameterError
@@ -27,6 +28,9 @@ __all__ = ["bounded_step"]
 
 _SHALLOWEST = 1e-3
 """Smallest depth in relief units: what is closer together nothing here tells apart."""
+
+_ROUNDING = 1e-12
+"""By so much, as a share, may a depth be missed that is all of the scene's."""
 
 _CONTACT = 1e-3
 """Gap in relief units up to which surfaces touch: they have no order."""
@@ -57,12 +61,13 @@ def bounded_step(
     attached = _attached(scene, params)
     # Points of faces with visible corners only are in front where the corners are.
     partly = ~visible[faces[face]].all(axis=1)
-    seen = point_rows(faces, face[partly], share[partly], n)
+    seen = point_rows(faces[face[partly]], share[partly], n)
     lowest = lowest_seen(z, seen, visible)
     deep = float(z.max()) - lowest
     depth = cast(float, params.depth) / scene.unit
-    weight = kept * face_weights(vertices, faces, in_front, depth / max(deep, depth))
-    if deep <= depth:
+    shallow_enough = deep <= depth * (1.0 + _ROUNDING)
+    weight = kept * face_weights(vertices, faces, in_front, 1.0 if shallow_enough else depth / deep)
+    if shallow_enough:
         shallow = {"already_shallower": 1, "attached_missed": int((z[attached] > lowest).sum())}
         return BoundedStage(face_weight=weight, attached=attached, z=on_plane(z - lowest), counts=shallow)
 

@@ -238,7 +238,7 @@ class ReliefParams:
 
     @property
     def unused(self) -> tuple[str, ...]:
-        """The parameters that are not at their defaults, but without effect in this mode.
+        """The parameters of the points that are not at their defaults, but without effect in this mode.
 
         Examples
         --------

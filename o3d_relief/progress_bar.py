@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import shutil
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -27,9 +27,13 @@ def on_terminal() -> bool:
     return sys.stderr is not None and sys.stderr.isatty()
 
 
-def _columns() -> int:
-    """Return the width of the terminal; of one that says that it has none, the usual one."""
-    return shutil.get_terminal_size().columns
+def _size() -> dict[str, int]:
+    """Return the size of the terminal; of one that says that it has none, the usual one."""
+    try:
+        columns, rows = os.get_terminal_size(sys.stderr.fileno())
+    except OSError:  # a stream that is none of the system's
+        columns, rows = 0, 0
+    return {"ncols": (columns or 80) - 1, "nrows": rows or 24}
 
 
 class StageBar:
@@ -63,7 +67,7 @@ class StageBar:
                 desc=stage,
                 bar_format=_WITHOUT,
                 file=sys.stderr,
-                ncols=_columns(),
+                **_size(),
                 leave=False,
                 mininterval=0.2,
                 miniters=0,
@@ -125,7 +129,7 @@ class BatchBar:
                 initial=share,
                 bar_format=_MANY,
                 file=sys.stderr,
-                ncols=_columns(),
+                **_size(),
                 leave=False,
                 miniters=0,
             )

@@ -20,7 +20,7 @@ def test_folders_stand_for_what_can_be_read_in_them(tmp_path):
 def test_no_inputs(tmp_path):
     with pytest.raises(FileError, match="There is no mesh and no point cloud in the folder"):
         find_inputs([tmp_path])
-    with pytest.raises(FileError, match=r"There is no file or folder a.ply, nor any of the 1 others"):
+    with pytest.raises(FileError, match=r"There is no file or folder a.ply, nor is any other"):
         find_inputs(["a.ply", tmp_path / "b.ply"])
     for wrong in ([], "scan.ply", Path("scan.ply")):
         with pytest.raises(ParameterError, match="inputs must be a sequence of files, at least one"):

@@ -159,6 +159,12 @@ def test_a_depth_beside_a_file_takes_the_place_of_its_alpha(tmp_path, scene):
             ["--depth", "3"],
             {"depth": 3.0, "alpha": None, "alpha_min": None},
         ),
+        ('{"depth": 9, "mode": "attenuation"}', ["--alpha-min", "0.1"], {"depth": 9, "alpha_min": 0.1}),
+        (
+            '{"depth": 9, "mode": "attenuation", "alpha_min": 0.1}',
+            ["--depth", "7"],
+            {"depth": 7, "alpha_min": 0.1},
+        ),
         ('{"depth": "20%", "k": 30}', ["--alpha", "0.5"], {"depth": None, "alpha": 0.5, "k": 30}),
     ):
         file.write_text(f'{{"params": {given}}}')

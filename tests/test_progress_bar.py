@@ -45,14 +45,24 @@ def test_the_share_is_drawn(monkeypatch):
     assert terminal.getvalue().split("\r")[-1].strip() == ""
 
 
-def test_a_terminal_that_says_it_has_no_width(monkeypatch):
-    terminal = watched(monkeypatch)
-    monkeypatch.setattr("os.get_terminal_size", lambda *_: os.terminal_size((0, 0)))
-    monkeypatch.delenv("COLUMNS", raising=False)
-    bar = StageBar()
-    bar("order", 0.5)
-    bar.close()
-    assert "order" in terminal.getvalue()
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pty")
+@pytest.mark.parametrize(("columns", "widest"), [(0, 79), (40, 39)])
+def test_a_bar_fits_on_its_terminal(monkeypatch, columns, widest):
+    import fcntl
+    import pty
+    import struct
+    import termios
+
+    ours, theirs = pty.openpty()
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 0, columns, 0, 0))
+    with os.fdopen(theirs, "w") as terminal, os.fdopen(ours, "rb", buffering=0) as screen:
+        monkeypatch.setattr(sys, "stderr", terminal)
+        bar = StageBar()
+        bar("order", 0.5)
+        lines = screen.read(4096).decode().split("\r")
+        bar.close()
+    assert "order" in lines[1]
+    assert max(map(len, lines)) <= widest
 
 
 def test_elsewhere_there_is_none(monkeypatch):

@@ -10,6 +10,9 @@ from o3d_relief.bounds.pairs import Pairs, next_to_each_other
 
 __all__ = ["column_pairs"]
 
+_NARROW = 0.01
+"""Weights below minus this are those of slivers without an area, which are met by chance."""
+
 
 def column_pairs(lines: Lines, *, side: int) -> Pairs:
     """Pair the points that follow each other on the lines of a regular grid, as `grid_pairs` does.
@@ -46,7 +49,8 @@ def column_pairs(lines: Lines, *, side: int) -> Pairs:
     triangle, row = _rows(x[corners], y[corners], side)
     triangle, row, column = _lines_on(x, y, corners, triangle, row, side)
     weights = _weights(x, y, corners, triangle, row, column)
-    met = np.flatnonzero(~lines.borders.grazed(triangle, weights))
+    inside = weights.min(axis=1, initial=0.0) >= -_NARROW
+    met = np.flatnonzero(inside & ~lines.borders.grazed(triangle, weights))
     triangle, weights = triangle[met], weights.take(met, axis=0)
     heights = np.ascontiguousarray(lines.vertices[:, 2])
     point = lines.faces.take(triangle, axis=0)
@@ -123,11 +127,12 @@ def _weights(
     row: NDArray[np.int64],
     column: NDArray[np.int64],
 ) -> NDArray[np.float64]:
-    """Return the barycentric coordinates (q, 3) at which lines meet triangles."""
+    """Return the barycentric coordinates (q, 3) at which lines meet triangles; -1 where they have no area."""
     across = [x[corner[triangle]] - column for corner in corners]
     up = [y[corner[triangle]] - row for corner in corners]
     weights = np.stack([across[i - 2] * up[i - 1] - across[i - 1] * up[i - 2] for i in range(3)])
-    weights /= weights.sum(axis=0)
+    area = weights.sum(axis=0)
+    weights = np.where(area == 0.0, -1.0, weights / np.where(area == 0.0, 1.0, area))
     return np.ascontiguousarray(weights.T)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import open3d as o3d
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from o3d_relief.rays import unit_box
@@ -97,11 +96,3 @@ def face_weights(
     size = np.linalg.norm(normal, axis=1)
     towards = np.abs(normal[:, 2]) / np.where(size > 0.0, size, 1.0)
     return np.where(seen, np.hypot(towards, steepest), _HIDDEN)
-
-
-def point_rows(
-    faces: NDArray[np.int64], face: NDArray[np.int64], weights: NDArray[np.float64], n: int
-) -> sp.csr_array:
-    """Return the rows, (q, n), that give the heights of points of the surface."""
-    starts = np.arange(len(face) + 1, dtype=np.int64) * 3
-    return sp.csr_array((weights.ravel(), faces[face].ravel(), starts), shape=(len(face), n))

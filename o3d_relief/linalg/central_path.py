@@ -126,10 +126,12 @@ class CentralPath:
         some = np.flatnonzero(counted)
         return np.asarray(rest + self.rows[some].T @ self.force[2][some])
 
-    def broken(self, x: Vector) -> sp.csr_array:
-        """Return the known rows that an x breaks, (q, n)."""
-        others, bound = self._others.rows, self._others.bound
-        return sp.vstack([self.rows[self.rows @ x <= self._bound], others[others @ x <= bound]]).tocsr()
+    def broken(self, x: Vector, kept_by: Vector) -> sp.csr_array:
+        """Return the known rows that an x breaks, but another one keeps, (q, n)."""
+        known = ((self.rows, self._bound), (self._others.rows, self._others.bound))
+        return sp.vstack(
+            [rows[(rows @ x <= bound) & (rows @ kept_by > bound)] for rows, bound in known]
+        ).tocsr()
 
     def add(self, rows: sp.csr_array, bound: Vector) -> None:
         """Add rows, but for those that have been added before.

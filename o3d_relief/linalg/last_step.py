@@ -48,14 +48,22 @@ def last_step(
     path.advance(least_gap)
     back = np.zeros(len(accepted), dtype=bool)
     for _ in range(_TRIES):
-        x = np.where(back, accepted, path.x)
-        wrong = path.broken(x)
+        x = _with_known_rows(path, accepted, back)
+        wrong, _ = more_rows(x)
         if wrong.shape[0] == 0:
-            wrong, _ = more_rows(x)
-            if wrong.shape[0] == 0:
-                return x if path.objective(x) <= path.objective(accepted) else accepted
+            return x if path.objective(x) <= path.objective(accepted) else accepted
         known = int(back.sum())
         back[wrong.indices] = True
         if int(back.sum()) == known:  # what more_rows looks at has moved as a whole
             break
     return accepted
+
+
+def _with_known_rows(path: CentralPath, accepted: Vector, back: NDArray[np.bool_]) -> Vector:
+    """Send back what known rows need, further and further; `back` grows, so that this comes to an end."""
+    while True:
+        x = np.where(back, accepted, path.x)
+        wrong = path.broken(x, accepted)
+        if wrong.shape[0] == 0:
+            return np.asarray(x)
+        back[wrong.indices] = True

@@ -28,7 +28,7 @@ _ROUGH = 12
 """Rounds from which on all are solved exactly: where most unknowns end on bounds, a few steps may not do."""
 
 _LOWEST_FIRST = 3
-"""Rounds after which only what is lowest around is held: at first, all that is below is far too much."""
+"""Rounds in which only what is lowest around is held: at first, all that is below is far too much."""
 
 _ROUNDS = 40
 

@@ -6,7 +6,8 @@ from o3d_relief.bounds.crossings import crossings, edges_of
 from o3d_relief.bounds.grid import grid_pairs
 from o3d_relief.bounds.lines import Lines
 from o3d_relief.bounds.pairs import Pairs, vertex_pairs
-from o3d_relief.bounds.seen import face_weights, point_rows, seen_faces, seen_points
+from o3d_relief.bounds.rows import point_rows
+from o3d_relief.bounds.seen import face_weights, seen_faces, seen_points
 from o3d_relief.linalg import interior
 from o3d_relief.linalg.laplacian import cotangent_laplacian
 from o3d_relief.stages.visibility import visible_vertices
@@ -14,7 +15,7 @@ from shapes import bust, grid, hills, joined, moved
 
 
 def no_rows(n):
-    return point_rows(np.zeros((0, 3), dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros((0, 3)), n)
+    return point_rows(np.zeros((0, 3), dtype=np.int64), np.zeros((0, 3)), n)
 
 
 def closest(shape, depth, *, attach=(), weights=None, min_gap=0.0):
@@ -26,7 +27,7 @@ def closest(shape, depth, *, attach=(), weights=None, min_gap=0.0):
     form, _ = cotangent_laplacian(vertices, faces, weights=weight if weights is None else weight * weights)
     partly = ~visible[faces[face]].all(axis=1)
     pairs = Pairs.join([vertex_pairs(Lines(vertices, faces)), grid_pairs(Lines(vertices, faces), side=256)])
-    seen = point_rows(faces, face[partly], share[partly], n)
+    seen = point_rows(faces[face[partly]], share[partly], n)
     found = closest_relief(
         vertices,
         faces,
@@ -145,6 +146,6 @@ def test_many_parts_are_not_solved_in_patches(monkeypatch):
 
 def test_lowest_seen_counts_points_of_faces():
     z = np.array([1.0, 2.0, -4.0])
-    rows = point_rows(np.array([[0, 1, 2]]), np.array([0]), np.array([[0.25, 0.5, 0.25]]), 3)
+    rows = point_rows(np.array([[0, 1, 2]]), np.array([[0.25, 0.5, 0.25]]), 3)
     assert lowest_seen(z, rows, np.array([True, True, False])) == 0.25
     assert lowest_seen(z, no_rows(3), np.array([True, True, False])) == 1.0

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from o3d_relief.bounds.seen import face_weights, point_rows, seen_faces, seen_points
+from o3d_relief.bounds.rows import point_rows
+from o3d_relief.bounds.seen import face_weights, seen_faces, seen_points
 from shapes import grid, joined, moved, sphere
 
 
@@ -33,5 +34,5 @@ def test_weights_are_those_of_the_slopes():
 def test_rows_give_the_heights_of_points():
     vertices, faces = sphere(8)
     face, weights = seen_points(vertices, faces, side=16)
-    heights = point_rows(faces, face, weights, len(vertices)) @ vertices[:, 2]
+    heights = point_rows(faces[face], weights, len(vertices)) @ vertices[:, 2]
     assert heights == pytest.approx(np.einsum("qk,qk->q", weights, vertices[faces[face], 2]))

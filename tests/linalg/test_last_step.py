@@ -72,6 +72,14 @@ def test_known_rows_are_kept(followed):
     assert found[one] - found[other] >= there[one] - there[other] - 1e-12
 
 
+def test_a_row_that_was_broken_before_stops_nothing(followed):
+    there = followed.x
+    row = sp.eye_array(len(there)).tocsr()[[5]]
+    followed.add(row, there[[5]] + 1.0)  # neither x keeps it
+    followed.lack[:] = 0.0
+    assert last_step(followed, there, nothing_more, least_gap(followed)) is not there
+
+
 def test_what_is_never_well_leaves_all_as_it_was(followed):
     there = followed.x
     all_wrong = sp.eye_array(len(there)).tocsr(), there
