@@ -180,7 +180,7 @@ class LiveConstruction:
         form, pull = springs.system(~among_loose)
         points = np.flatnonzero(held[self._index])
         responses = self._responses((self._laplacian + form).tocsr(), points, keep_factor=True)
-        loose_form, loose_pull = springs.system(among_loose)
+        loose_form, loose_pull = springs.system(among_loose, following=True)
         coupled = (self._laplacian + loose_form).tocsr()
         _, group = connected_components(coupled, directed=False)
         known = np.isin(group, group[held])

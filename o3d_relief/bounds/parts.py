@@ -23,6 +23,10 @@ __all__ = ["PartSprings", "Ties", "find_springs", "tie_parts"]
 _ACROSS_GAPS = 0.1
 """Stiffness of a spring across a gap, against cotangent weights of about 1."""
 
+_FOLLOWING = 0.1
+"""Share of that where one of the two parts holds no fixed point: over its empty space it is to move, and not to be
+drawn out into spikes by springs that disagree."""
+
 _IN_CONTACT = 10.0
 """Stiffness of a spring between points that touch."""
 
@@ -91,9 +95,17 @@ class PartSprings:
         change[: len(self.stacked)] = shrink - self.stacked.gap
         return change
 
-    def system(self, chosen: NDArray[np.bool_]) -> tuple[sp.csr_array, sp.csr_array]:
-        """Return the quadratic form (n, n) of some springs, and what their changes pull with, (n, s')."""
-        weighted = self.rows[chosen].T @ sp.diags_array(self.stiffness[chosen])
+    def system(
+        self, chosen: NDArray[np.bool_], *, following: bool = False
+    ) -> tuple[sp.csr_array, sp.csr_array]:
+        """Return the quadratic form (n, n) of some springs, and what their changes pull with, (n, s').
+
+        Those that loose parts follow are softer across gaps.
+        """
+        stiffness = self.stiffness.copy()
+        if following:
+            stiffness[: len(self.stacked)] *= _FOLLOWING
+        weighted = self.rows[chosen].T @ sp.diags_array(stiffness[chosen])
         return (weighted @ self.rows[chosen]).tocsr(), weighted.tocsr()
 
     def ties(self, held: NDArray[np.bool_], shrink: NDArray[np.float64]) -> Ties:
@@ -112,7 +124,7 @@ class PartSprings:
         """
         loose, change = self.loose(held), self.change(shrink)
         among_held, held_pull = self.system(~loose)
-        to_loose, loose_pull = self.system(loose)
+        to_loose, loose_pull = self.system(loose, following=True)
         return Ties(
             among_held=among_held,
             among_held_pull=held_pull @ change[~loose],

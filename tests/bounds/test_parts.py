@@ -71,3 +71,17 @@ def test_part_without_a_point_does_not_keep_its_old_depth():
     before = relief.stages["scene"].vertices[len(head[0]) :, 2]
     assert z.max() < before.min()
     assert relief.stages["order"].counts["left"] == 0
+
+
+def test_what_is_held_at_one_end_is_not_drawn_out_over_empty_space():
+    held_end, board = moved(grid(3, size=4), (-18, 0, 20)), moved(grid(9, size=40), (0, 0, 20.05))
+    shape = joined(grid(21), held_end, board)
+    fixed = np.concatenate([[0, 20, 420, 440], np.arange(441, 450)])
+    laplacian, ties = _tie(shape, fixed)
+    assert ties.in_contact > 0
+    assert ties.across_gaps > 0
+    built = construct(
+        shape[0], laplacian, fixed, shape[0][fixed, 2], to_loose=(ties.to_loose, ties.to_loose_pull)
+    )
+    drawn_out = np.ptp(built.z[450:])
+    assert 0.5 < drawn_out < 9.0  # as stiff as between parts that hold points they draw it out by 14
