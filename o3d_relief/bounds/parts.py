@@ -24,8 +24,8 @@ _ACROSS_GAPS = 0.1
 """Stiffness of a spring across a gap, against cotangent weights of about 1."""
 
 _FOLLOWING = 0.1
-"""Share of that where one of the two parts holds no fixed point: over its empty space it is to move, and not to be
-drawn out into spikes by springs that disagree."""
+"""Share of that where one of the two parts holds no fixed point: over its empty space it is to move, not to
+be drawn out into spikes by springs that disagree."""
 
 _IN_CONTACT = 10.0
 """Stiffness of a spring between points that touch."""
