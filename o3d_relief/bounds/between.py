@@ -6,10 +6,11 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from o3d_relief.bounds.crossings import edges_of, new_crossings
+from o3d_relief.bounds.crossings import edges_of
 from o3d_relief.bounds.cuts import cut_crossings
 from o3d_relief.bounds.gaps import out_of_order
 from o3d_relief.bounds.hinges import hinged_pairs
+from o3d_relief.bounds.new_crossings import new_crossings
 from o3d_relief.bounds.pairs import Pairs, foot_pairs
 from o3d_relief.bounds.parted import Parted
 from o3d_relief.bounds.raster import Raster

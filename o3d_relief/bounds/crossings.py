@@ -6,31 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 import open3d as o3d
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from o3d_relief.bounds.origin import triangles_cross
 from o3d_relief.bounds.pairs import Pairs
-from o3d_relief.bounds.ragged import combined
 from o3d_relief.rays import unit_box
 
-__all__ = ["Crossings", "around", "cross", "crossings", "edges_of", "new_crossings"]
+__all__ = ["DEEP", "Crossings", "cross", "crossings", "edges_of", "once", "stretches"]
 
-_DEEP = 1e-3
+DEEP = 1e-3
 """An edge pierces a triangle where it reaches at least this far, in relief units, to both of its sides and,
 seen from the front, away from its border: less is what float32 rays cannot tell from contact."""
-
-_SHALLOW = 1e-4
-"""The same for crossings that are to be mended: what is deepest between two edges is less deep at them."""
-
-_SURE = 0.999 * _DEEP
-"""The same for contact that is to be mended: the finished mesh is welded and cut, and rounds once more."""
-
-_FEW = 500
-"""So many crossings at most are looked at together with what is next to them."""
-
-_CLOSE = 0.02
-"""Gap in relief units below which surfaces next to a crossing are about to cross, too."""
 
 _INSIDE = 1e-4
 """Share at both ends of an edge that does not count as crossing: there it meets its neighbours."""
@@ -71,7 +56,7 @@ class Crossings:
         on_edge = first + self.along * (last - first)
         return np.asarray(on_edge - np.einsum("cek,ck->ce", self.inside, z[self.face]))
 
-    def pierced(self, z: NDArray[np.float64], *, deep: float = _DEEP) -> NDArray[np.bool_]:
+    def pierced(self, z: NDArray[np.float64], *, deep: float = DEEP) -> NDArray[np.bool_]:
         """Find those that cross for the vertex heights z, (c,), by more than `deep` to both sides."""
         gaps = self.gaps(z)
         return np.asarray((gaps.min(axis=1) < -deep) & (gaps.max(axis=1) > deep))
@@ -93,7 +78,7 @@ class Crossings:
         """
         gap = self.gaps(before)
         middle = gap.sum(axis=1)
-        touching = np.abs(gap).max(axis=1) <= _DEEP
+        touching = np.abs(gap).max(axis=1) <= DEEP
         middle = np.where(touching, self.gaps(after).sum(axis=1), middle)
         # The end that is further off tells the side: the other one lies within a rounding error of it.
         furthest = np.take_along_axis(gap, np.abs(gap).argmax(axis=1)[:, None], axis=1)[:, 0]
@@ -121,57 +106,13 @@ class Crossings:
         )
 
 
-def new_crossings(
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    edges: NDArray[np.int64],
-    z: NDArray[np.float64],
-) -> tuple[Pairs, int]:
-    """Find the edges that pierce a triangle in front of S now, and did not before.
-
-    Parameters
-    ----------
-    vertices : (n, 3) float64
-        Before.
-    faces : (m, 3) int64
-    edges : (e, 2) int64
-    z : (n,) float64
-        Heights now.
-
-    Returns
-    -------
-    pairs : Pairs
-        Two for each of them, in the order of before, and those next to them that are about to follow.
-    count : int
-        Number of crossings.
-    """
-    before = vertices[:, 2]
-    # Neither edges nor triangles behind S count: no rays for them.
-    in_front, (a, b, c) = z > 0.0, faces.T
-    front = faces.compress(in_front[a] | in_front[b] | in_front[c], axis=0)
-    rising = edges.compress(in_front[edges[:, 0]] | in_front[edges[:, 1]], axis=0)
-    found = crossings(np.column_stack([vertices[:, :2], z]), front, rising)
-    new = found.pierced(z, deep=_SURE) & ~found.pierced(before)
-    apart = np.abs(found.gaps(before)).max(axis=1) > _DEEP
-    new |= apart & found.pierced(z, deep=_SHALLOW) & ~found.pierced(before, deep=_SHALLOW / 2.0)
-    found = found.select(new)
-    pairs = found.pairs(before, z)
-    if not 0 < len(found) <= _FEW:
-        return pairs, len(found)
-    beside = around(found, vertices, faces)
-    beside = beside.select(~beside.pierced(before) & (np.abs(beside.gaps(before)).max(axis=1) > _DEEP))
-    close = beside.pairs(before, z)
-    gap = np.subtract(*close.heights(z))
-    return Pairs.join([pairs, close.select(gap < np.minimum(_CLOSE, close.gap / 4.0))]), len(found)
-
-
 def edges_of(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return the edges of a mesh, (e, 2), each once, by their vertices in rising order."""
     start = np.ascontiguousarray(faces.T)
     end = start[[1, 2, 0]]
     n = int(faces.max(initial=0)) + 1
     keys = (np.minimum(start, end) * n + np.maximum(start, end)).ravel()
-    return np.stack(np.divmod(_once(keys), n), axis=1)
+    return np.stack(np.divmod(once(keys), n), axis=1)
 
 
 def crossings(vertices: NDArray[np.float64], faces: NDArray[np.int64], edges: NDArray[np.int64]) -> Crossings:
@@ -193,7 +134,7 @@ def crossings(vertices: NDArray[np.float64], faces: NDArray[np.int64], edges: ND
     """
     none = np.zeros(0, dtype=np.int64)
     if len(edges) == 0 or len(faces) == 0:  # all that is left of the relief has shrunk to lines
-        return _stretches(vertices[:, :2], edges[none], faces[none])
+        return stretches(vertices[:, :2], edges[none], faces[none])
     scene, middle, size = unit_box(vertices, faces)
     places = (vertices - middle + [0.0, 0.0, _OVER]) / size
     rays = _rays(places, edges)
@@ -203,7 +144,7 @@ def crossings(vertices: NDArray[np.float64], faces: NDArray[np.int64], edges: ND
     if len(candidates):
         candidates = candidates[_meets(scene, _rays(places, edges[candidates][:, ::-1]))]
     if len(candidates) == 0:  # Open3D dies of a list without rays
-        return _stretches(vertices[:, :2], edges[none], faces[none])
+        return stretches(vertices[:, :2], edges[none], faces[none])
     hits = scene.list_intersections(o3d.core.Tensor(rays[candidates]))
     t = hits["t_hit"].numpy()
     ray = candidates[hits["ray_ids"].numpy().astype(np.int64)]
@@ -211,7 +152,7 @@ def crossings(vertices: NDArray[np.float64], faces: NDArray[np.int64], edges: ND
     inside = (t > _INSIDE) & (t < 1.0 - _INSIDE)
     edge, face = edges[ray[inside]], faces[triangle[inside]]
     apart = (edge[:, :, None] != face[:, None, :]).all(axis=(1, 2))
-    return _stretches(vertices[:, :2], edge[apart], face[apart])
+    return stretches(vertices[:, :2], edge[apart], face[apart])
 
 
 def _rays(places: NDArray[np.float64], edges: NDArray[np.int64]) -> NDArray[np.float32]:
@@ -231,8 +172,22 @@ def _meets(scene: o3d.t.geometry.RaycastingScene, rays: NDArray[np.float32]) -> 
     return np.asarray(hits.numpy())
 
 
-def _stretches(plane: NDArray[np.float64], edge: NDArray[np.int64], face: NDArray[np.int64]) -> Crossings:
-    """Clip each edge, seen from the front, to its triangle."""
+def stretches(plane: NDArray[np.float64], edge: NDArray[np.int64], face: NDArray[np.int64]) -> Crossings:
+    """Clip edges, seen from the front, to triangles.
+
+    Parameters
+    ----------
+    plane : (n, 2) float64
+        x and y of the vertices, in relief units.
+    edge : (c, 2) int64
+    face : (c, 3) int64
+        What each edge may pierce.
+
+    Returns
+    -------
+    Crossings
+        Without those that do not lie above or below each other, or hardly.
+    """
     a, b, c = (plane[face[:, i]] for i in range(3))
     area = cross(b - a, c - a)
     safe = np.where(area == 0.0, 1.0, area)
@@ -252,7 +207,7 @@ def _stretches(plane: NDArray[np.float64], edge: NDArray[np.int64], face: NDArra
     heights = np.abs(area)[:, None] / np.maximum(opposite, np.finfo(np.float64).tiny)
     from_border = (inside.mean(axis=1) * heights).min(axis=1)
     everything = Crossings(edge=edge, face=face, along=along, inside=inside)
-    return everything.select((begin <= finish) & (from_border > _DEEP))
+    return everything.select((begin <= finish) & (from_border > DEEP))
 
 
 def cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -260,60 +215,7 @@ def cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]
     return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
 
-def around(
-    found: Crossings, vertices: NDArray[np.float64], faces: NDArray[np.int64], *, uncrossed: bool = False
-) -> Crossings:
-    """Return the edges near crossings, each with the triangles near its crossing that lie above or below it.
-
-    What is kept apart at one edge likes to cross at the next: they belong together.
-
-    Parameters
-    ----------
-    found : Crossings
-    vertices : (n, 3) float64
-    faces : (m, 3) int64
-    uncrossed : bool
-        Of triangles that do not cross each other only.
-
-    Returns
-    -------
-    Crossings
-        Among the edges of all triangles that share a vertex with one of the two, and the triangles that
-        share a vertex with the other.
-    """
-    here = np.zeros(len(vertices), dtype=bool)
-    here[found.edge] = True
-    here[found.face] = True
-    a, b, c = faces.T
-    faces = faces[here[a] | here[b] | here[c]]
-    n, m = len(vertices), len(faces)
-    entries = np.ones(faces.size, dtype=bool), (faces.ravel(), np.repeat(np.arange(m), 3))
-    beside = sp.csr_array(entries, shape=(n, m))
-    query, at_edge = _beside(beside, found.edge)
-    other_query, at_face = _beside(beside, found.face)
-    first, second = combined(query, other_query)
-    one, other = np.divmod(_once(at_edge[first] * m + at_face[second]), m)
-    one, other = np.concatenate([one, other]), np.concatenate([other, one])
-    low, high = (extreme(vertices[:, :2][faces], axis=1) for extreme in (np.min, np.max))
-    overlap = ((low[one] <= high[other]) & (low[other] <= high[one])).all(axis=1)
-    if uncrossed:
-        overlap[overlap] = ~triangles_cross(vertices[faces[one[overlap]]], vertices[faces[other[overlap]]])
-    one, other = one[overlap], other[overlap]
-    ends = np.sort(faces[one][:, [[0, 1], [1, 2], [2, 0]]], axis=2)
-    keys = (ends[:, :, 0] * n + ends[:, :, 1]) * m + other[:, None]
-    apart = (ends[:, :, :, None] != faces[other][:, None, None, :]).all(axis=(2, 3))
-    edge, face = np.divmod(_once(keys[apart]), m)
-    return _stretches(vertices[:, :2], np.stack(np.divmod(edge, n), axis=1), faces[face])
-
-
-def _beside(beside: sp.csr_array, corners: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the faces with one of some corners (q, c), each once: number of the row, rising, and face."""
-    rows = beside[corners.ravel()]
-    query = np.repeat(np.repeat(np.arange(len(corners)), corners.shape[1]), np.diff(rows.indptr))
-    return np.divmod(_once(query * beside.shape[1] + rows.indices), beside.shape[1])
-
-
-def _once(keys: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return keys in rising order, each once; np.unique takes far longer on some versions of NumPy."""
+def once(keys: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return keys, at least 0, in rising order, each once; np.unique can take far longer."""
     keys = np.sort(keys)
     return keys[np.diff(keys, prepend=-1) > 0]

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from o3d_relief.bounds.crossings import cross, new_crossings
+from o3d_relief.bounds.crossings import cross
+from o3d_relief.bounds.new_crossings import new_crossings
 from o3d_relief.bounds.pairs import Pairs
 from o3d_relief.bounds.raster import Raster
 

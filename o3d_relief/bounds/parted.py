@@ -7,7 +7,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from o3d_relief.bounds.crossings import Crossings, around, crossings, edges_of
+from o3d_relief.bounds.crossings import Crossings, crossings, edges_of
+from o3d_relief.bounds.new_crossings import around
 from o3d_relief.bounds.pairs import Pairs
 from o3d_relief.bounds.raster import Raster
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from o3d_relief.bounds.crossings import crossings, edges_of, new_crossings
+from o3d_relief.bounds.crossings import crossings, edges_of
 from shapes import bust, grid, joined, moved, sphere
 
 
@@ -71,18 +71,6 @@ def test_pairs_of_what_touched_stay_on_the_side_they_prefer():
     assert pairs.gap == pytest.approx(0.0)
     upper, lower = pairs.heights(after[:, 2])
     assert (upper - lower).sum() > 0
-
-
-def test_new_crossings_bring_along_what_is_about_to_follow():
-    before, faces = joined(grid(9), moved(_needle(1.0), (1.0, -20.0, 3.0)))
-    z = before[:, 2] - np.where(np.arange(len(before)) < 81, 0.0, 3.0)
-    pairs, count = new_crossings(before, faces, edges_of(faces), z + 5.0)  # in front of S
-    found = crossings(np.column_stack([before[:, :2], z]), faces, edges_of(faces))
-    assert count == found.pierced(z).sum() > 0
-    assert len(pairs) > 2 * count
-    assert (pairs.gap > 1.5).all()  # upper and lower as they were
-    assert new_crossings(before, faces, edges_of(faces), before[:, 2] + 5.0)[1] == 0
-    assert new_crossings(before, faces, edges_of(faces), z - 5.0)[1] == 0  # cut off
 
 
 def test_shallow_crossings_are_seen_where_asked_for():

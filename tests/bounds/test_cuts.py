@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 
 from o3d_relief import cotangent_laplacian
-from o3d_relief.bounds.crossings import edges_of, new_crossings
+from o3d_relief.bounds.crossings import edges_of
 from o3d_relief.bounds.cuts import cut_crossings
+from o3d_relief.bounds.new_crossings import new_crossings
 from o3d_relief.bounds.order import keep_order
 from o3d_relief.bounds.pairs import Pairs, foot_pairs
 from o3d_relief.bounds.raster import Raster
