@@ -25,7 +25,7 @@ class Inversions:
     ----------
     tested : int
     inverted : int
-        Those that changed places.
+        Those that changed places; surfaces that only touch in the picture are in no order.
     crossed : int
         Those whose triangles crossed each other in the scene already.
     worst : float
@@ -76,18 +76,26 @@ def inversions(
     gap = upper - lower
     turned = np.flatnonzero(gap < -_SAME)
     there = pairs.select(turned)
-    crossed = origin.crossed(
-        _met(vertices, there.upper, there.upper_weights), _met(vertices, there.lower, there.lower_weights)
-    )
+    places = [
+        _met(vertices, corners, weights)
+        for corners, weights in (
+            (there.upper, there.upper_weights),
+            (there.lower, there.lower_weights),
+        )
+    ]
+    # Where the one ends in the picture and the other begins, rays meet both by a rounding error.
+    stacked = origin.covers(*places)
+    turned, places = turned[stacked], [place[stacked] for place in places]
+    crossed = origin.crossed(*places)
     inverted = turned[~crossed]
     wide = gap >= max(min_gap, _SAME)
     missed = np.flatnonzero(wide & (pairs.gap < min_gap - _SAME) & (min_gap > 0.0))
     known = pairs.select(few(turned[crossed]))
-    places = pair_places("inversion", vertices, pairs.select(few(inverted)), origin)
-    places += pair_places("old inversion", vertices, known, origin, crossed=True)
+    told = pair_places("inversion", vertices, pairs.select(few(inverted)), origin)
+    told += pair_places("old inversion", vertices, known, origin, crossed=True)
     if len(missed):
         close, asked = pairs.select(few(missed)), pairs.select(wide)
-        places += gap_places(vertices, before, close, asked, origin, min_gap=min_gap)
+        told += gap_places(vertices, before, close, asked, origin, min_gap=min_gap)
     return Inversions(
         tested=len(pairs),
         inverted=len(inverted),
@@ -95,7 +103,7 @@ def inversions(
         worst=float(np.abs(gap[inverted]).max(initial=0.0)),
         gaps_tested=int(wide.sum()),
         gaps_missed=len(missed),
-        places=places,
+        places=told,
     )
 
 

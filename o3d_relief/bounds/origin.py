@@ -8,10 +8,13 @@ from numpy.typing import NDArray
 
 from o3d_relief.bounds.ragged import combined
 
-__all__ = ["Origin", "triangles_cross"]
+__all__ = ["Origin", "triangles_cross", "triangles_overlap"]
 
 _ROUNDING = 1e-9
 """Relief units up to which corners lie in a plane, and stretches are points."""
+
+_TOUCHING = 2e-5
+"""Relief units up to which triangles only touch in the picture: twice what float32 rays tell apart."""
 
 
 class Origin:
@@ -50,6 +53,23 @@ class Origin:
         """
         row, a, b = self._combined(one, other)
         found = triangles_cross(self._corners[a], self._corners[b])
+        return np.bincount(row, weights=found, minlength=len(one)) > 0
+
+    def covers(self, one: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Tell whether triangles around two places of the relief cover a part of the picture together.
+
+        Parameters
+        ----------
+        one, other : (q, 3) int64
+            As in `crossed`.
+
+        Returns
+        -------
+        (q,) bool
+            False where they touch at most: no line along z passes through both.
+        """
+        row, a, b = self._combined(one, other)
+        found = triangles_overlap(self._corners[a, :, :2], self._corners[b, :, :2])
         return np.bincount(row, weights=found, minlength=len(one)) > 0
 
     def meet(
@@ -133,6 +153,39 @@ def triangles_cross(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDA
         first, last = _covered(height, np.einsum("qck,qk->qc", corners - middle, line))
         begin, end = np.maximum(begin, first), np.minimum(end, last)
     return np.asarray(apart & (end - begin > _ROUNDING))
+
+
+def triangles_overlap(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Tell which pairs of triangles of the picture overlap by more than a rounding error.
+
+    Convex shapes are apart where a side of one of them has all of the other beyond it.
+
+    Parameters
+    ----------
+    one, other : (q, 3, 2) float64
+        Corners, in relief units; triangles without an area overlap nothing.
+
+    Returns
+    -------
+    (q,) bool
+
+    Examples
+    --------
+    >>> corner = np.array([[[0, 0], [4, 0], [0, 4.0]]])
+    >>> [bool(triangles_overlap(corner, corner + [x, 0])[0]) for x in (3.0, 4.0, 5.0)]
+    [True, False, False]
+    """
+    apart = np.zeros(len(one), dtype=bool)
+    for corners, others in ((one, other), (other, one)):
+        side = np.roll(corners, -1, axis=1) - corners
+        outwards = np.stack([side[..., 1], -side[..., 0]], axis=2)
+        length = np.linalg.norm(outwards, axis=2, keepdims=True)
+        outwards = outwards / np.where(length > 0.0, length, 1.0)
+        own, far = (np.einsum("qsk,qck->qsc", outwards, some) for some in (corners, others))
+        # Whichever way round the corners go: the triangle lies on one side of each of its sides.
+        left = own.min(axis=2) - far.max(axis=2), far.min(axis=2) - own.max(axis=2)
+        apart |= (np.maximum(*left) >= -_TOUCHING).any(axis=1)
+    return np.asarray(~apart)
 
 
 def _normals(corners: NDArray[np.float64]) -> NDArray[np.float64]:

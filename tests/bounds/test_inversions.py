@@ -1,10 +1,11 @@
+import numpy as np
 import pytest
 
 from o3d_relief.bounds.grid import grid_pairs
 from o3d_relief.bounds.inversions import inversions
 from o3d_relief.bounds.lines import Lines
 from o3d_relief.bounds.origin import Origin
-from o3d_relief.bounds.pairs import vertex_pairs
+from o3d_relief.bounds.pairs import Pairs, as_points, vertex_pairs
 from shapes import grid, joined, moved
 
 
@@ -47,3 +48,17 @@ def test_gaps_that_became_too_small_are_counted():
     assert inversions(relief, pairs, scene[:, 2], origin, min_gap=2.0).gaps_missed == len(pairs)
     assert inversions(relief, pairs, scene[:, 2], origin, min_gap=0.5).gaps_missed == 0
     assert inversions(relief, pairs, relief[:, 2], origin, min_gap=2.0).gaps_tested == 0
+
+
+@pytest.mark.parametrize(("overlap", "inverted"), [(0.0, 0), (1e-6, 0), (0.01, 1)])
+def test_surfaces_that_only_touch_in_the_picture_are_in_no_order(overlap, inverted):
+    # The second begins where the first ends; rays at its border meet the first by chance.
+    scene, faces = joined(grid(3, size=20), moved(grid(3, size=20), (20 - overlap, 5, 10)))
+    corner, weights = as_points(np.array([9]))
+    side, share = np.array([[3, 6, 7]]), np.array([[0.0, 0.5, 0.5]])
+    assert scene[9, :2] == pytest.approx(share[0] @ scene[side[0], :2], abs=0.011)
+    relief = scene * [1, 1, -1]
+    pairs = Pairs(upper=side, upper_weights=share, lower=corner, lower_weights=weights, gap=np.array([10.0]))
+    found = inversions(relief, pairs, scene[:, 2], Origin(faces, faces, scene))
+    assert found.inverted == inverted
+    assert found.tested == 1

@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 import trimesh
+from scipy.optimize import linprog
 
-from o3d_relief.bounds.origin import Origin, triangles_cross
+from o3d_relief.bounds.origin import Origin, triangles_cross, triangles_overlap
 from shapes import grid, joined, moved
 
 
@@ -99,3 +100,26 @@ def test_sheets_that_cross_along_lines_of_their_meshes_touch_and_sheets_whose_ed
             np.tile(sheets[1][faces], (len(faces), 1, 1)),
         )
         assert triangles_cross(one, other).any() == crosses
+
+
+def test_triangles_of_the_picture_overlap_unless_a_side_parts_them():
+    rng = np.random.default_rng(3)
+    one, other = rng.uniform(-5, 5, (2, 200, 3, 2))
+    found = triangles_overlap(one, other)
+    for a, b, overlap in zip(one, other, found, strict=True):
+        # The point that is furthest inside both, as barycentric coordinates see it.
+        same_place = np.block(
+            [[a.T, -b.T, np.zeros((2, 1))], [np.ones(3), np.zeros(4)], [np.zeros(3), np.ones(3), 0]]
+        )
+        inside = np.column_stack([-np.eye(6), np.ones(6)])
+        best = linprog(
+            -np.eye(7)[6],
+            A_ub=inside,
+            b_ub=np.zeros(6),
+            A_eq=same_place,
+            b_eq=[0, 0, 1, 1],
+            bounds=(None, None),
+        )
+        assert overlap == (best.x[6] > 0)
+    assert 50 < found.sum() < 150
+    assert np.array_equal(found, triangles_overlap(other, one[:, ::-1]))
