@@ -52,6 +52,7 @@ def batch(options: argparse.Namespace) -> int:
             engine=options.engine,
             scheduler=options.scheduler,
             max_triangles=options.max_triangles,
+            strict=options.strict,
             on_done=lambda entry: bar.write(tell, _line(entry)),
             on_progress=bar,
         )
@@ -75,5 +76,7 @@ def _line(entry: BatchEntry) -> str:
         error = str(entry.error)
         return f"failed: {error}" if entry.input in error else f"failed: {entry.input}: {error}"
     told = f"{entry.triangles} triangles, {entry.depth:.4g} deep, {entry.seconds:.1f} s"
+    if entry.certificate is not None:
+        told += f"; certificate: {'fails' if entry.failures else 'clean'}"
     head = f"{entry.input} -> {entry.output}: {told}"
-    return "\n  ".join([head, *entry.notes])
+    return "\n  ".join([head, *entry.failures, *entry.notes])
