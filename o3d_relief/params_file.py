@@ -75,7 +75,8 @@ def load_params(path: str | Path) -> tuple[ReliefParams, View]:
     except OSError as error:
         raise FileError(f"{path} cannot be read: {error.strerror}.") from error
     except (ValueError, RecursionError) as error:
-        raise FileError(f"{path} is not a parameter file in JSON: {error}; {_WANTED}.") from error
+        why = "it is no text" if isinstance(error, UnicodeDecodeError) else error
+        raise FileError(f"{path} is not a parameter file in JSON: {why}; {_WANTED}.") from error
     if isinstance(values, dict) and {"params", "view", "stages"} <= values.keys():
         raise FileError(
             f"{path} is the report of a relief, not a parameter file: take everything but its "

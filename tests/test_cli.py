@@ -176,7 +176,8 @@ def test_a_depth_beside_a_file_takes_the_place_of_its_alpha(tmp_path, scene):
 def test_options_are_not_abbreviated(tmp_path, scene, capsys):
     with pytest.raises(SystemExit):
         main(["make", str(scene), str(tmp_path / "r.ply"), "--dept", "3"])
-    assert "unrecognized arguments: --dept" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert "o3d-relief make: error: unrecognized arguments: --dept 3 (see o3d-relief make --help)" in told
     assert main(["make", str(scene), str(tmp_path / "r.ply"), "--k=12"]) == 0
 
 
@@ -513,6 +514,14 @@ def test_dry_run_refuses_what_the_run_refuses(tmp_path, scene, capsys, words, se
     refused = _fails(capsys, *command)
     assert sentence in refused
     assert _fails(capsys, *command, "--dry-run").splitlines()[-1] == refused.splitlines()[-1]
+
+
+def test_dry_run_refuses_a_flat_solid(tmp_path, capsys):
+    write_mesh(tmp_path / "flat.ply", to_mesh(grid(9)))
+    command = ["make", tmp_path / "flat.ply", tmp_path / "s.stl", "-k", "9", "--width-mm", "50"]
+    refused = _fails(capsys, *command)
+    assert "it cannot become a solid" in refused
+    assert _fails(capsys, *command, "--dry-run") == refused
 
 
 def test_dry_run_of_a_relief_tells_the_unit_of_the_file(tmp_path, scene, capsys):

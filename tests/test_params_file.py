@@ -85,7 +85,7 @@ def test_wrong_values_are_named(tmp_path, text, words):
     [
         (b"", "not a parameter file in JSON"),
         (b"k = 3", "not a parameter file in JSON"),
-        (b"\xff\xfe\x00", "not a parameter file in JSON"),
+        (b"\xff\xfe\x00", "not a parameter file in JSON: it is no text"),
         (b'{"params": {"k": 3, "k": 4}}', "'k' is given twice"),
         (b"[" * 100_000, "not a parameter file in JSON"),
     ],

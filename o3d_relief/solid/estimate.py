@@ -14,7 +14,7 @@ from o3d_relief.plate_params import PlateParams
 from o3d_relief.rays import unit_box
 from o3d_relief.scene.convert import mesh_arrays
 from o3d_relief.scene.frame import to_relief_units
-from o3d_relief.solid.sizes import scale_for
+from o3d_relief.solid.sizes import check_extents, scale_for
 from o3d_relief.steps import frame_step, perspective_step, visibility_step, visible_depth
 
 __all__ = ["Estimate", "estimate_relief", "estimate_solid", "relief_depth"]
@@ -76,10 +76,11 @@ def estimate_solid(
     Raises
     ------
     MeshError
-        A mesh from which no relief can be made.
+        A mesh from which no relief, or no solid, can be made.
     """
     vertices, faces, unit = _seen(mesh, view)
     used = vertices[np.unique(faces)]
+    check_extents(used)
     scale = scale_for(used[:, :2], plate)
     width, height, scene_depth = np.ptp(used, axis=0) * scale
     seen_depth = visible_depth(vertices, visibility_step(vertices, faces, view).visible) * unit
