@@ -42,6 +42,12 @@ def test_exit_codes_and_lines(monkeypatch, capsys, entries, code):
     assert (f"1 of {len(entries)} inputs failed: see out" in told) == (FAILED in entries)
 
 
+def test_errors_name_options_as_they_are_typed(monkeypatch, capsys):
+    entry = dataclasses.replace(FAILED, error="k must be at most 9: 3 triangles (max_triangles).")
+    assert _run(monkeypatch, [entry])[0] == 2
+    assert "failed: /a/y.ply: -k must be at most 9: 3 triangles (--max-triangles)." in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(("failures", "said"), [([], "clean\n"), (["Bent."], "fails\n  Bent.\n  No uvs.\n")])
 def test_certificates_are_told(monkeypatch, capsys, failures, said):
     entry = dataclasses.replace(MADE, certificate={"failures": failures})
