@@ -10,7 +10,7 @@ import numpy as np
 import o3d_relief as rel
 
 
-def main(scene: str | None = None, output: str = "bounded_depths.png", panel: int = 400) -> None:
+def main(scene: str | None = None, output: str = "bounded_depths.png", *, panel: int = 400) -> None:
     mesh = rel.read_mesh(scene) if scene else rel.demo_scene()
     meshes = {}
     for share in ("50%", "25%", "10%"):
@@ -26,4 +26,6 @@ def main(scene: str | None = None, output: str = "bounded_depths.png", panel: in
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    from start import start
+
+    start(main, __doc__, sys.argv[1:])

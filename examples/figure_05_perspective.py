@@ -11,7 +11,7 @@ import open3d as o3d
 import o3d_relief as rel
 
 
-def main(scene: str | None = None, output: str = "figure_05.png", panel: int = 460) -> None:
+def main(scene: str | None = None, output: str = "figure_05.png", *, panel: int = 460) -> None:
     mesh = rel.read_mesh(scene) if scene else rel.demo_scene()
     points = {"scene": None, "far vanishing point": (0, 0, -250), "near vanishing point": (0, 0, -70)}
     bent = {}
@@ -26,4 +26,6 @@ def main(scene: str | None = None, output: str = "figure_05.png", panel: int = 4
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    from start import start
+
+    start(main, __doc__, sys.argv[1:])

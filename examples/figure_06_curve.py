@@ -35,7 +35,7 @@ def folded_strip(steps: int = 301) -> o3d.geometry.TriangleMesh:
     )
 
 
-def main(scene: str | None = None, output: str = "figure_06.png", panel: int = 460) -> None:
+def main(scene: str | None = None, output: str = "figure_06.png", *, panel: int = 460) -> None:
     mesh = rel.read_mesh(scene) if scene else folded_strip()
     k = 64 if scene else 14
     relief = rel.make_relief(mesh, rel.ReliefParams.paper(k=k))
@@ -82,4 +82,6 @@ def main(scene: str | None = None, output: str = "figure_06.png", panel: int = 4
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    from start import start
+
+    start(main, __doc__, sys.argv[1:])

@@ -16,7 +16,7 @@ import numpy as np
 import o3d_relief as rel
 
 
-def main(scene: str | None = None, output: str = "figure_07.png", panel: int = 460) -> None:
+def main(scene: str | None = None, output: str = "figure_07.png", *, panel: int = 460) -> None:
     mesh = rel.read_mesh(scene) if scene else rel.demo_scene()
     points = rel.make_relief(mesh, rel.ReliefParams.paper(k=128)).stages["attenuation"]
     scaled = np.abs(points.differential[points.action == "scale"])
@@ -38,4 +38,6 @@ def main(scene: str | None = None, output: str = "figure_07.png", panel: int = 4
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    from start import start
+
+    start(main, __doc__, sys.argv[1:])

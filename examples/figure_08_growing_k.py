@@ -7,7 +7,7 @@ import numpy as np
 import o3d_relief as rel
 
 
-def main(scene: str | None = None, output: str = "figure_08.png", panel: int = 400) -> None:
+def main(scene: str | None = None, output: str = "figure_08.png", *, panel: int = 400) -> None:
     mesh = rel.read_mesh(scene) if scene else rel.demo_scene()
     meshes = {}
     for k in (1, 16, 64, 128):
@@ -22,4 +22,6 @@ def main(scene: str | None = None, output: str = "figure_08.png", panel: int = 4
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    from start import start
+
+    start(main, __doc__, sys.argv[1:])

@@ -11,7 +11,7 @@ import open3d as o3d
 import o3d_relief as rel
 
 
-def main(scene: str | None = None, output: str = "figure_09.png", panel: int = 460, k: int = 256) -> None:
+def main(scene: str | None = None, output: str = "figure_09.png", *, panel: int = 460, k: int = 256) -> None:
     mesh = rel.read_mesh(scene) if scene else rel.demo_scene()
     stages = rel.make_relief(mesh, rel.ReliefParams.paper(k=k)).stages
     smooth = rel.make_relief(mesh, rel.ReliefParams.paper(k=k, smooth_points=True)).stages
@@ -48,4 +48,6 @@ def main(scene: str | None = None, output: str = "figure_09.png", panel: int = 4
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    from start import start
+
+    start(main, __doc__, sys.argv[1:])

@@ -13,7 +13,7 @@ import o3d_relief as rel
 RED, BLUE = (0.85, 0.2, 0.15), (0.15, 0.35, 0.8)
 
 
-def main(scene: str | None = None, output: str = "figure_10.png", panel: int = 460, k: int = 64) -> None:
+def main(scene: str | None = None, output: str = "figure_10.png", *, panel: int = 460, k: int = 64) -> None:
     mesh = rel.read_mesh(scene) if scene else rel.demo_scene()
     editor = rel.ReliefEditor(mesh, rel.ReliefParams(k=k))
     placed = type(mesh)(mesh).transform(np.linalg.inv(editor.to_scene))
@@ -44,4 +44,6 @@ def main(scene: str | None = None, output: str = "figure_10.png", panel: int = 4
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    from start import start
+
+    start(main, __doc__, sys.argv[1:])

@@ -11,7 +11,7 @@ import open3d as o3d
 import o3d_relief as rel
 
 
-def main(scene: str | None = None, output: str = "figure_11.png", panel: int = 460) -> None:
+def main(scene: str | None = None, output: str = "figure_11.png", *, panel: int = 460) -> None:
     mesh = rel.read_mesh(scene) if scene else rel.demo_scene()
     mesh.vertex_colors = o3d.utility.Vector3dVector()  # stone: the light alone tells the shape
     method = rel.make_relief(mesh, rel.ReliefParams(k=128, alpha=0.8))
@@ -39,4 +39,6 @@ def main(scene: str | None = None, output: str = "figure_11.png", panel: int = 4
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    from start import start
+
+    start(main, __doc__, sys.argv[1:])

@@ -20,7 +20,7 @@ from baselines.height_field import sample
 from baselines.weyrich import bas_relief
 
 
-def main(scene: str | None = None, output: str = "figure_12.png", panel: int = 460) -> None:
+def main(scene: str | None = None, output: str = "figure_12.png", *, panel: int = 460) -> None:
     mesh = rel.read_mesh(scene) if scene else rel.demo_scene()
     relief = rel.make_relief(mesh, rel.ReliefParams(k=128, alpha=0.8))
     depth = relief.summary()["relief_depth"]
@@ -43,4 +43,6 @@ def main(scene: str | None = None, output: str = "figure_12.png", panel: int = 4
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    from start import start
+
+    start(main, __doc__, sys.argv[1:])

@@ -4,7 +4,6 @@ Without a mesh: the built-in scene from two sides, one long coil, and a still li
 """
 
 import sys
-from collections.abc import Sequence
 
 import numpy as np
 import open3d as o3d
@@ -52,7 +51,7 @@ def still_life() -> Mesh:
     return scene
 
 
-def main(scenes: Sequence[str] = (), output: str = "figure_13.png", panel: int = 420) -> None:
+def main(*scenes: str, output: str = "figure_13.png", panel: int = 420) -> None:
     found = [(rel.read_mesh(scene), 128, rel.View()) for scene in scenes]
     if not found:
         found = [(rel.demo_scene(), 128, rel.View()), (rel.demo_scene(), 128, rel.View(front="x"))]
@@ -71,4 +70,6 @@ def main(scenes: Sequence[str] = (), output: str = "figure_13.png", panel: int =
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    from start import start
+
+    start(main, __doc__, sys.argv[1:])

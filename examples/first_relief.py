@@ -19,4 +19,6 @@ def main(scene: str | None = None, output: str = "relief.ply") -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    from start import start
+
+    start(main, __doc__, sys.argv[1:])

@@ -46,7 +46,11 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         A parameter file that cannot be used.
     """
     words = _join_points(list(arguments))
-    options = _parser({}).parse_args(words)
+    parser = _parser({})
+    options, unknown = parser.parse_known_args(words)
+    if unknown:  # argparse would point to the help of all commands
+        parser.prog += f" {options.command}"
+        parser.error(f"unrecognized arguments: {' '.join(unknown)}")
     if getattr(options, "params", None) is None:
         return options
     params, view = load_params(options.params)

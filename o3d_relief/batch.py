@@ -59,6 +59,7 @@ def make_reliefs(
     engine: str = "loky",
     scheduler: str | None = None,
     max_triangles: int | None = None,
+    strict: bool = False,
     on_done: OnDone | None = None,
     on_progress: OnProgress | None = None,
 ) -> Batch:
@@ -91,6 +92,8 @@ def make_reliefs(
         Address of the cluster; where omitted, Dask and Ray start one on this machine.
     max_triangles : int, optional
         Larger meshes are refused; 10,000,000 where omitted.
+    strict : bool
+        A relief whose certificate is not clean is not written, and its input counts as failed.
     on_done : callable, optional
         Called with the entry of each input as soon as it is done; not for those that were done already.
     on_progress : callable, optional
@@ -120,6 +123,7 @@ def make_reliefs(
         scan=ScanParams() if scan is None else scan,
         ending=_checked_ending(ending),
         max_triangles=max_triangles,
+        strict=strict,
     )
     sources = find_inputs(inputs)
     folder = _made_folder(Path(out))
@@ -177,7 +181,9 @@ def _open_tasks(sources: list[str], folder: Path, manifest: Manifest, recipe: Re
     tasks = []
     for source in sources:
         entry = manifest.entries.get(source)
-        if entry is None or entry.output != names[source] or not entry.holds(folder, digest):
+        kept = entry is not None and entry.output == names[source] and entry.holds(folder, digest)
+        refused = recipe.strict and entry is not None and (entry.certificate is None or entry.failures)
+        if not kept or refused:
             tasks.append(
                 BatchTask(
                     input=source, output=names[source], folder=str(folder), recipe=recipe, digest=digest

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 from o3d_relief.batch_manifest import MANIFEST
 from o3d_relief.console import tell, tell_unused
+from o3d_relief.option_words import as_options
 from o3d_relief.relief_arguments import chosen_params, chosen_view
 from o3d_relief.scan_arguments import chosen_scan
 
@@ -52,7 +54,8 @@ def batch(options: argparse.Namespace) -> int:
             engine=options.engine,
             scheduler=options.scheduler,
             max_triangles=options.max_triangles,
-            on_done=lambda entry: bar.write(tell, _line(entry)),
+            strict=options.strict,
+            on_done=lambda entry: bar.write(tell, _line(entry, vars(options))),
             on_progress=bar,
         )
     finally:
@@ -69,11 +72,13 @@ def batch(options: argparse.Namespace) -> int:
     return 3 if failed else 0
 
 
-def _line(entry: BatchEntry) -> str:
-    """Return what is said of an input, notes included."""
+def _line(entry: BatchEntry, names: Collection[str]) -> str:
+    """Return what is said of an input, notes included; `names` are the options of the command."""
     if not entry.made:
-        error = str(entry.error)
+        error = as_options(str(entry.error), names)
         return f"failed: {error}" if entry.input in error else f"failed: {entry.input}: {error}"
     told = f"{entry.triangles} triangles, {entry.depth:.4g} deep, {entry.seconds:.1f} s"
+    if entry.certificate is not None:
+        told += f"; certificate: {'fails' if entry.failures else 'clean'}"
     head = f"{entry.input} -> {entry.output}: {told}"
-    return "\n  ".join([head, *entry.notes])
+    return "\n  ".join([head, *entry.failures, *entry.notes])

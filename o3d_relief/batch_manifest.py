@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
 from o3d_relief.errors import FileError
 from o3d_relief.files import write_bytes
@@ -36,6 +37,8 @@ class BatchEntry:
         Of the relief, in the input's unit.
     triangles : int or None
         Of the relief.
+    certificate : dict or None
+        What was measured on the relief, as in `Relief.report`; None where there was none to measure.
     error : str or None
         A sentence that says why there is no relief.
     notes : tuple of str
@@ -56,6 +59,7 @@ class BatchEntry:
     seconds: float
     depth: float | None = None
     triangles: int | None = None
+    certificate: dict[str, Any] | None = None
     error: str | None = None
     notes: tuple[str, ...] = ()
     attempts: int = 1
@@ -68,6 +72,11 @@ class BatchEntry:
     def made(self) -> bool:
         """Whether there is a relief."""
         return self.status == "made"
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """What the certificate says does not hold, a sentence each."""
+        return () if self.certificate is None else tuple(self.certificate["failures"])
 
     def line(self) -> str:
         """Return the line of the manifest."""

@@ -44,6 +44,8 @@ class Recipe:
     ending : str
         Of the reliefs' files: ".ply".
     max_triangles : int or None
+    strict : bool
+        Whether a relief whose certificate is not clean is refused.
     """
 
     params: ReliefParams
@@ -51,10 +53,12 @@ class Recipe:
     scan: ScanParams
     ending: str
     max_triangles: int | None
+    strict: bool = False
 
     def digest(self) -> str:
-        """Return the SHA-256 of all of it and of the package's version."""
-        text = json.dumps([__version__, asdict(self)], sort_keys=True)
+        """Return the SHA-256 of what makes a relief the one it is, and of the package's version."""
+        values = {name: value for name, value in asdict(self).items() if name != "strict"}
+        text = json.dumps([__version__, values], sort_keys=True)
         return sha256(text.encode()).hexdigest()
 
 
@@ -117,7 +121,7 @@ def run_task(task: BatchTask) -> BatchEntry:
         except Exception as error:  # noqa: BLE001, whatever is wrong with one input must not stop the others
             entry = task.entry(
                 status="failed",
-                seconds=round(time.perf_counter() - started, 3),
+                seconds=_since(started),
                 error=_sentence(error),
                 attempts=attempts,
                 **stamp,
@@ -152,6 +156,10 @@ def lost_entry(task: BatchTask, notes: Notes) -> BatchEntry:
     return entry
 
 
+def _since(started: float) -> float:
+    return round(time.perf_counter() - started, 3)
+
+
 def _sentence(error: Exception) -> str:
     if isinstance(error, ReliefError):
         return str(error)
@@ -172,19 +180,24 @@ def _make(task: BatchTask, notes: Notes, started: float, known: dict[str, Any]) 
         scene, recipe.params, view=recipe.view, scan=scan, max_triangles=recipe.max_triangles
     )
     output = folder / task.output
+    known |= {
+        "depth": float(relief.mesh.get_max_bound()[2]),
+        "triangles": len(relief.mesh.triangles),
+        "certificate": json.loads(json.dumps(relief.report()["certificate"])),  # as it is read again
+        "notes": (*left_out, *(lost_attributes(task.output, scene) if scan is None else ())),
+    }
+    failures = relief.certificate.failures
+    if recipe.strict and failures:
+        refused = f"{task.output} is not written (strict): {failures[0]}"
+        entry = task.entry(status="failed", error=refused, seconds=_since(started), **known)
+        notes.keep(entry)
+        return entry
     files = mesh_files(output, relief.mesh)
-    depth = float(relief.mesh.get_max_bound()[2])
-    picture = render(relief.mesh, size=_PICTURE, plate=True, title=f"{output.stem}, {depth:.4g} deep")
+    title = f"{output.stem}, {known['depth']:.4g} deep"
+    picture = render(relief.mesh, size=_PICTURE, plate=True, title=title)
     save_png(folder / PICTURES / f"{output.stem}.png", picture)
-    entry = task.entry(
-        status="made",
-        seconds=round(time.perf_counter() - started, 3),
-        depth=depth,
-        triangles=len(relief.mesh.triangles),
-        notes=(*left_out, *(lost_attributes(task.output, scene) if scan is None else ())),
-        output_sha256=sha256(files[output.name]).hexdigest(),
-        **known,
-    )
+    checksum = sha256(files[output.name]).hexdigest()
+    entry = task.entry(status="made", seconds=_since(started), output_sha256=checksum, **known)
     # The note comes first: killed in between, its checksum does not fit what is there, and all is done again.
     notes.keep(entry)
     write_files(output, files)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import cast
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from o3d_relief.bounds.bounded import closest_relief, lowest_seen
@@ -24,7 +25,7 @@ from o3d_relief.progress import Tick, silent
 from o3d_relief.records import BoundedStage, SceneStage
 from o3d_relief.steps import on_plane
 
-__all__ = ["bounded_step"]
+__all__ = ["bounded_step", "check_bounded"]
 
 _SHALLOWEST = 1e-3
 """Smallest depth in relief units: what is closer together nothing here tells apart."""
@@ -59,9 +60,7 @@ def bounded_step(
     in_front = seen_faces(faces, visible, face)
     kept = _kept_shape(scene, params)[faces].mean(axis=1)
     attached = _attached(scene, params)
-    # Points of faces with visible corners only are in front where the corners are.
-    partly = ~visible[faces[face]].all(axis=1)
-    seen = point_rows(faces[face[partly]], share[partly], n)
+    seen = _seen_rows(faces, visible, face, share)
     lowest = lowest_seen(z, seen, visible)
     deep = float(z.max()) - lowest
     depth = cast(float, params.depth) / scene.unit
@@ -110,6 +109,27 @@ def bounded_step(
     return BoundedStage(
         face_weight=weight, attached=attached, energy_gap=found.gap, z=on_plane(found.z), counts=counts
     )
+
+
+def check_bounded(
+    vertices: NDArray[np.float64], visible: NDArray[np.bool_], scene: SceneStage, params: ReliefParams
+) -> None:
+    """Refuse what `bounded_step` would refuse, without its long work."""
+    z, faces = vertices[:, 2], scene.faces
+    _kept_shape(scene, params)
+    _attached(scene, params)
+    lowest = lowest_seen(z, _seen_rows(faces, visible, *seen_points(vertices, faces)), visible)
+    depth = cast(float, params.depth) / scene.unit
+    if float(z.max()) - lowest > depth * (1.0 + _ROUNDING):
+        _check_depth(depth, scene.unit)
+
+
+def _seen_rows(
+    faces: NDArray[np.int64], visible: NDArray[np.bool_], face: NDArray[np.int64], share: NDArray[np.float64]
+) -> sp.csr_array:
+    """Return the rows of the seen points whose faces have hidden corners: others are in front with these."""
+    partly = ~visible[faces[face]].all(axis=1)
+    return point_rows(faces[face[partly]], share[partly], len(visible))
 
 
 def _stacked(

@@ -54,6 +54,7 @@ def make(options: argparse.Namespace) -> int:
     from o3d_relief.making import make_checked, tell_estimate
     from o3d_relief.pipeline import make_relief
     from o3d_relief.progress_bar import StageBar
+    from o3d_relief.rehearsal import check_scene
     from o3d_relief.scene.scan import scan_points
     from o3d_relief.scene.write import lost_attributes
     from o3d_relief.solid.estimate import relief_depth
@@ -71,11 +72,12 @@ def make(options: argparse.Namespace) -> int:
             # Its size must be known before the relief is made.
             scanned = scan_points(scene, meshing, view=view, on_stage=tell_stage, on_progress=bar)
             scene, meshing = scanned.mesh, None
-        if options.dry_run:
-            tell_estimate(scene, params, view, plate, tell, field=options.undercut_free)
-            return 0
         if plate is not None and plate.depth_mm is not None:
             params = replace(params, depth=relief_depth(scene, view, plate))
+        if options.dry_run:
+            check_scene(scene, params, view, options.max_triangles)
+            tell_estimate(scene, params, view, plate, tell, field=options.undercut_free)
+            return 0
         relief = make_relief(
             scene if scanned is None else scanned,
             params,

@@ -17,7 +17,7 @@ from o3d_relief.progress import OnProgress, Progress
 from o3d_relief.relief import Relief
 from o3d_relief.solid.body import Solid
 from o3d_relief.solid.checks import SolidReport, check_solid
-from o3d_relief.solid.estimate import estimate_solid
+from o3d_relief.solid.estimate import estimate_relief, estimate_solid
 from o3d_relief.solid.make import make_solid
 from o3d_relief.solid.measures import wall_thickness
 from o3d_relief.workshop import Work, work_on
@@ -103,7 +103,7 @@ def tell_estimate(
     *,
     field: bool = False,
 ) -> None:
-    """Tell what a solid will measure.
+    """Tell what a solid, or a relief alone, will measure.
 
     Parameters
     ----------
@@ -111,20 +111,22 @@ def tell_estimate(
     params : ReliefParams
     view : View
     plate : PlateParams or None
-        None where only a relief is wanted: told is what a solid with the defaults would measure.
+        None where only a relief is wanted, which has no volume and is told in the unit of the file.
     tell : callable
         Takes a line.
     field : bool
         Whether it becomes a height field, whose triangles are as many as its pixels are small.
     """
-    found = estimate_solid(mesh, params, view, PlateParams() if plate is None else plate)
-    x, y, z = found.size_mm
+    if plate is None:
+        found, precision, unit = estimate_relief(mesh, params, view), ".4g", "in the unit of the file"
+        unit += ": a surface, no solid (--width-mm)"
+    else:
+        found, precision, unit = estimate_solid(mesh, params, view, plate), ".2f", "mm"
+    x, y, z = (format(side, precision) for side in found.size)
     tell(f"seen      {found.visible_depth:.4g} deep, in the unit of the file; --depth 100% is all of it")
-    depth = f"{z:.2f}" if found.depth_known else f"at most {z:.2f}"
-    as_solid = " as a solid of that width (--width-mm); without, a surface in the unit of the file"
-    as_solid = as_solid if plate is None else ""
-    tell(f"size      {x:.2f} x {y:.2f} x {depth} mm{as_solid}")
-    tell(f"volume    {'about' if found.depth_known else 'at most'} {found.volume_mm3 / 1000.0:.0f} cm3")
+    tell(f"size      {x} x {y} x {'' if found.depth_known else 'at most '}{z} {unit}")
+    if found.volume_mm3 is not None:
+        tell(f"volume    {'about' if found.depth_known else 'at most'} {found.volume_mm3 / 1000.0:.0f} cm3")
     finer = ", more where textures become colours" if mesh.has_textures() else ""
     finer += ", more in a height field" if field else ""
     tell(f"triangles about {found.triangles}{finer}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import reprlib
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, TypeVar
@@ -14,6 +15,8 @@ from o3d_relief.params import ReliefParams, View
 from o3d_relief.point_edits import PointEdit
 
 __all__ = ["field_values", "load_params", "save_params"]
+
+_WANTED = 'wanted is an object with "params" and "view", as the editor and save_params write it'
 
 _Kind = TypeVar("_Kind", ReliefParams, View, PointEdit)
 
@@ -61,7 +64,7 @@ def load_params(path: str | Path) -> tuple[ReliefParams, View]:
     Raises
     ------
     FileError
-        No such file, or not a JSON file.
+        No such file, not a JSON file, or the report of a relief.
     ParameterError
         A key that is not known, or a value out of its range.
     """
@@ -72,7 +75,13 @@ def load_params(path: str | Path) -> tuple[ReliefParams, View]:
     except OSError as error:
         raise FileError(f"{path} cannot be read: {error.strerror}.") from error
     except (ValueError, RecursionError) as error:
-        raise FileError(f"{path} is not a parameter file in JSON: {error}.") from error
+        why = "it is no text" if isinstance(error, UnicodeDecodeError) else error
+        raise FileError(f"{path} is not a parameter file in JSON: {why}; {_WANTED}.") from error
+    if isinstance(values, dict) and {"params", "view", "stages"} <= values.keys():
+        raise FileError(
+            f"{path} is the report of a relief, not a parameter file: take everything but its "
+            '"params" and "view" out of a copy of it.'
+        )
     try:
         _check_keys("the file", values, ("o3d_relief", "params", "view"))
         given = _object("params", values.get("params", {}), ReliefParams)
@@ -113,10 +122,12 @@ def _object(name: str, values: object, kind: type[_Kind]) -> dict[str, Any]:
 
 def _check_keys(name: str, values: object, known: list[str] | tuple[str, ...]) -> dict[str, Any]:
     if not isinstance(values, dict):
-        raise ParameterError(f"{name} must be an object with names and values. Got {values!r} instead.")
+        short = reprlib.repr(values)
+        raise ParameterError(f"{name} must be an object with names and values. Got {short} instead.")
     for key in values:
         if key not in known:
-            raise ParameterError(f"{key!r} is not known in {name}: choose among {', '.join(known)}.")
+            wanted = f"; {_WANTED}" if name == "the file" else ""
+            raise ParameterError(f"{key!r} is not known in {name}: choose among {', '.join(known)}{wanted}.")
     return values
 
 

@@ -13,6 +13,7 @@ import open3d as o3d
 import pytest
 
 import o3d_relief as rel
+from shapes import bust, to_mesh
 
 POSIX = pytest.mark.skipif(os.name != "posix", reason="signals and process groups of POSIX")
 QUICK = ("-k", "4", "--no-in-order")
@@ -264,6 +265,23 @@ def test_what_changed_is_made_again(tmp_path):
     assert (out / "ball_01.ply").read_bytes() == (out / "ball_00.ply").read_bytes()
     assert run(rel.ReliefParams(k=5, in_order=False)).already_done == 0
     assert run(rel.ReliefParams(k=5, in_order=False), view=rel.View(front="x")).already_done == 0
+
+
+def test_strict_makes_again_only_what_it_refuses(tmp_path):
+    inputs, out = write_balls(tmp_path / "in", 2), tmp_path / "out"
+    o3d.io.write_triangle_mesh(str(inputs[1]), to_mesh(bust(30)))
+    params = rel.ReliefParams(k=48, in_front=False)  # which leaves some of the bust behind the plane
+
+    def run(*, strict):
+        return rel.make_reliefs(inputs, out, params, jobs=1, strict=strict)
+
+    assert [entry.certificate["visible_behind"] > 0 for entry in run(strict=False).entries] == [False, True]
+    batch = run(strict=True)
+    assert batch.already_done == 1
+    assert [entry.made for entry in batch.entries] == [True, False]
+    assert "visible vertices lie behind the plane" in batch.failed[0].error
+    assert lines(out)[1]["certificate"]["visible_behind"] > 0
+    assert run(strict=False).failed == ()
 
 
 def test_called_off(tmp_path):

@@ -42,6 +42,19 @@ def test_exit_codes_and_lines(monkeypatch, capsys, entries, code):
     assert (f"1 of {len(entries)} inputs failed: see out" in told) == (FAILED in entries)
 
 
+def test_errors_name_options_as_they_are_typed(monkeypatch, capsys):
+    entry = dataclasses.replace(FAILED, error="k must be at most 9: 3 triangles (max_triangles).")
+    assert _run(monkeypatch, [entry])[0] == 2
+    assert "failed: /a/y.ply: -k must be at most 9: 3 triangles (--max-triangles)." in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("failures", "said"), [([], "clean\n"), (["Bent."], "fails\n  Bent.\n  No uvs.\n")])
+def test_certificates_are_told(monkeypatch, capsys, failures, said):
+    entry = dataclasses.replace(MADE, certificate={"failures": failures})
+    assert _run(monkeypatch, [entry])[0] == 0
+    assert f"3 deep, 1.2 s; certificate: {said}" in capsys.readouterr().err
+
+
 def test_an_error_that_does_not_name_its_file(monkeypatch, capsys):
     entry = dataclasses.replace(FAILED, error="No triangles.")
     assert _run(monkeypatch, [entry])[0] == 2
@@ -52,7 +65,7 @@ def test_every_option_arrives(tmp_path, monkeypatch):
     file = tmp_path / "p.json"
     rel.save_params(file, rel.ReliefParams(k=7, alpha=0.5), rel.View(front="-y", up="z"))
     words = ["--params", str(file), "--alpha", "0.75", "--jobs", "3", "--engine", "dask", "--scheduler", "tcp://h:1",
-             "--format", "glb", "--max-triangles", "99", "--max-hole", "2"]  # fmt: skip
+             "--format", "glb", "--max-triangles", "99", "--max-hole", "2", "--strict"]  # fmt: skip
     code, asked = _run(monkeypatch, [MADE], *words)
     assert code == 0
     assert asked["inputs"] == [Path("a.ply"), Path("scans")]
@@ -60,8 +73,9 @@ def test_every_option_arrives(tmp_path, monkeypatch):
     assert asked["params"] == rel.ReliefParams(k=7, alpha=0.75)
     assert asked["view"] == rel.View(front="-y", up="z")
     assert asked["scan"].max_hole == 2.0
-    names = ("jobs", "engine", "scheduler", "ending", "max_triangles")
-    assert [asked[name] for name in names] == [3, "dask", "tcp://h:1", ".glb", 99]
+    names = ("jobs", "engine", "scheduler", "ending", "max_triangles", "strict")
+    assert [asked[name] for name in names] == [3, "dask", "tcp://h:1", ".glb", 99, True]
+    assert _run(monkeypatch, [MADE])[1]["strict"] is False
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,7 @@ def made(tmp_path):
         input=str(scan), output="relief.obj", status="made", seconds=1.5, depth=1 / 3, triangles=7,
         notes=("no textures", "Größe"), attempts=2, input_bytes=6, input_mtime_ns=scan.stat().st_mtime_ns,
         recipe="abc", output_sha256=sha256(b"faces").hexdigest(),
+        certificate={"visible_behind": 2, "places": [{"where": [0.1, 1 / 3]}], "failures": ["2 lie behind."]},
     )  # fmt: skip
 
 
@@ -28,6 +29,8 @@ def failed(name):
 
 
 def test_a_line_says_all(made):
+    assert made.failures == ("2 lie behind.",)
+    assert failed("b.ply").failures == ()
     line = made.line()
     assert line.endswith("}\n")
     assert line.count("\n") == 1

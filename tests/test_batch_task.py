@@ -1,4 +1,5 @@
 import dataclasses
+import json
 from hashlib import sha256
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 import o3d_relief as rel
 from o3d_relief.batch_manifest import Notes
 from o3d_relief.batch_task import BatchTask, Recipe, run_task
-from shapes import hills, sphere, to_mesh
+from shapes import bust, hills, sphere, to_mesh
 
 RECIPE = Recipe(
     params=rel.ReliefParams(k=4, in_order=False),
@@ -36,6 +37,7 @@ def test_a_relief_its_picture_and_its_entry(tmp_path, task):
     assert entry.depth == np.asarray(expected.mesh.vertices)[:, 2].max()
     assert entry.triangles == len(expected.mesh.triangles)
     written = (tmp_path / "relief.ply").read_bytes()
+    assert entry.certificate == json.loads(json.dumps(expected.report()["certificate"]))
     assert entry.output_sha256 == sha256(written).hexdigest()
     rel.write_mesh(tmp_path / "alone.ply", expected.mesh)
     assert written == (tmp_path / "alone.ply").read_bytes()
@@ -71,6 +73,25 @@ def test_what_is_wrong_is_said(tmp_path, task, monkeypatch):
         monkeypatch.setattr("o3d_relief.pipeline.make_relief", broken)
         assert sentence in run_task(task).error
     assert Notes(tmp_path).attempts(task.input) == 0
+
+
+def test_strict_refuses_what_the_certificate_finds(tmp_path, task):
+    params = rel.ReliefParams(k=64, in_front=False)
+    o3d.io.write_triangle_mesh(task.input, to_mesh(bust(30)))
+    loose = dataclasses.replace(RECIPE, params=params)
+    entry = run_task(dataclasses.replace(task, recipe=dataclasses.replace(loose, strict=True)))
+    assert entry.status == "failed"
+    assert entry.error == f"relief.ply is not written (strict): {entry.failures[0]}"
+    assert "visible vertices lie behind the plane" in entry.failures[0]
+    assert not (tmp_path / "relief.ply").exists()
+    assert Notes(tmp_path).entry(task.input) == entry
+    made = run_task(dataclasses.replace(task, recipe=loose))
+    assert made.made
+    assert made.certificate == entry.certificate  # refused or not, the same was measured
+
+
+def test_strict_makes_the_same_reliefs():
+    assert dataclasses.replace(RECIPE, strict=True).digest() == RECIPE.digest()
 
 
 def test_a_file_that_has_cost_two_workers_is_not_begun_again(tmp_path, task):

@@ -176,7 +176,8 @@ def test_a_depth_beside_a_file_takes_the_place_of_its_alpha(tmp_path, scene):
 def test_options_are_not_abbreviated(tmp_path, scene, capsys):
     with pytest.raises(SystemExit):
         main(["make", str(scene), str(tmp_path / "r.ply"), "--dept", "3"])
-    assert "unrecognized arguments: --dept" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert "o3d-relief make: error: unrecognized arguments: --dept 3 (see o3d-relief make --help)" in told
     assert main(["make", str(scene), str(tmp_path / "r.ply"), "--k=12"]) == 0
 
 
@@ -495,6 +496,41 @@ def test_dry_run_writes_nothing(tmp_path, scene, capsys):
     assert "volume    at most" in told
     assert ", more in a height field" in told
     assert _files(tmp_path) == ["scene.ply"]
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["-k", "99999"], "-k must be at most the number of vertices"),
+        (["-k", "8", "--beta", "0.1,0.2"], "--beta must be one number or one for each of the 8"),
+        (["--depth", "9", "--attach", "99999"], "--attach must be numbers of the mesh's"),
+        (["--depth", "1e-9"], "--depth must be at least"),
+        (["--max-triangles", "9"], "--max-triangles"),
+        (["--vanishing-point", "0", "0", "-1e-9"], "--vanishing-point must lie behind the relief plane and"),
+    ],
+)
+def test_dry_run_refuses_what_the_run_refuses(tmp_path, scene, capsys, words, sentence):
+    command = ["make", scene, tmp_path / "r.ply", *words]
+    refused = _fails(capsys, *command)
+    assert sentence in refused
+    assert _fails(capsys, *command, "--dry-run").splitlines()[-1] == refused.splitlines()[-1]
+
+
+def test_dry_run_refuses_a_flat_solid(tmp_path, capsys):
+    write_mesh(tmp_path / "flat.ply", to_mesh(grid(9)))
+    command = ["make", tmp_path / "flat.ply", tmp_path / "s.stl", "-k", "9", "--width-mm", "50"]
+    refused = _fails(capsys, *command)
+    assert "it cannot become a solid" in refused
+    assert _fails(capsys, *command, "--dry-run") == refused
+
+
+def test_dry_run_of_a_relief_tells_the_unit_of_the_file(tmp_path, scene, capsys):
+    assert main(["make", str(scene), str(tmp_path / "r.ply"), "--dry-run", "--depth", "9"]) == 0
+    told = capsys.readouterr().err
+    x, y, _ = np.ptp(np.asarray(read_mesh(scene).vertices), axis=0)
+    assert f"size      {x:.4g} x {y:.4g} x 9 in the unit of the file: a surface, no solid" in told
+    assert "mm3" not in told
+    assert "volume" not in told
 
 
 def test_dry_run_of_a_textured_mesh(tmp_path, capsys):

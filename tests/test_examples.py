@@ -1,4 +1,8 @@
 import importlib.util
+import os
+import runpy
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -41,13 +45,14 @@ FIGURES = [
 
 
 def test_every_example_has_a_test():
-    assert {path.stem for path in EXAMPLES.glob("*.py")} == {"first_relief", "single_stages", *FIGURES}
+    names = {path.stem for path in EXAMPLES.glob("*.py")}
+    assert names == {"start", "first_relief", "single_stages", *FIGURES}
 
 
 @pytest.mark.parametrize("name", FIGURES)
 def test_figures(tmp_path, scene, capsys, name):
     output = tmp_path / "figure.png"
-    _load(name).main([scene] if name == "figure_13_gallery" else scene, str(output), panel=72)
+    _load(name).main(scene, output=str(output), panel=72)
     with Image.open(output) as picture:
         pixels = np.asarray(picture.convert("L"))
     assert min(pixels.shape) >= 64
@@ -82,3 +87,47 @@ def test_single_stages(scene, capsys):
     _load("single_stages").main(scene)
     before, after = capsys.readouterr().out.split("units: ")[1].split(" -> ")
     assert float(after) < float(before)
+
+
+def _run(name, *words):
+    words = [sys.executable, str(EXAMPLES / f"{name}.py"), *words]
+    environment = {**os.environ, "PYTHONPATH": str(EXAMPLES.parent)}
+    return subprocess.run(words, capture_output=True, text=True, check=False, env=environment)
+
+
+@pytest.mark.parametrize("name", ["first_relief", "figure_13_gallery"])
+def test_started_from_the_command_line(tmp_path, name):
+    broken = tmp_path / "broken.ply"
+    broken.write_bytes(b"ply\nformat ascii")
+    missing = _run(name, str(tmp_path / "missing.ply"))
+    for ended, told in ((missing, "missing.ply"), (_run(name, str(broken)), "broken.ply")):
+        assert (ended.returncode, ended.stdout) == (2, "")
+        assert len(ended.stderr.splitlines()) == 1
+        assert f"{name}.py: error: " in ended.stderr
+        assert told in ended.stderr
+
+
+@pytest.mark.parametrize("name", ["first_relief", "single_stages", *FIGURES])
+def test_help_is_the_docstring(name, capsys, monkeypatch):
+    monkeypatch.syspath_prepend(EXAMPLES)
+    monkeypatch.setattr("sys.argv", [f"{name}.py", "--help"])
+    runpy.run_path(str(EXAMPLES / f"{name}.py"), run_name="__main__")
+    told = capsys.readouterr().out
+    assert told.strip() == _load(name).__doc__.strip()
+    assert f"python examples/{name}.py" in told
+
+
+def test_too_many_words(capsys):
+    example = _load("first_relief")
+    with pytest.raises(SystemExit) as ended:
+        _load("start").start(example.main, example.__doc__, ["a.ply", "b.ply", "c.ply"])
+    assert ended.value.code == 2
+    assert "too many positional arguments, see --help" in capsys.readouterr().err
+
+
+def test_other_errors_are_not_hidden():
+    def main():
+        raise KeyError("a mistake in the script")
+
+    with pytest.raises(KeyError, match="a mistake"):
+        _load("start").start(main, "", [])

@@ -3,7 +3,17 @@ import json
 import numpy as np
 import pytest
 
-from o3d_relief import FileError, ParameterError, PointEdit, ReliefParams, View, load_params, save_params
+from o3d_relief import (
+    FileError,
+    ParameterError,
+    PointEdit,
+    ReliefParams,
+    View,
+    load_params,
+    make_relief,
+    save_params,
+)
+from shapes import bust, to_mesh
 
 EVERYTHING = [
     (ReliefParams(), View()),
@@ -75,7 +85,7 @@ def test_wrong_values_are_named(tmp_path, text, words):
     [
         (b"", "not a parameter file in JSON"),
         (b"k = 3", "not a parameter file in JSON"),
-        (b"\xff\xfe\x00", "not a parameter file in JSON"),
+        (b"\xff\xfe\x00", "not a parameter file in JSON: it is no text"),
         (b'{"params": {"k": 3, "k": 4}}', "'k' is given twice"),
         (b"[" * 100_000, "not a parameter file in JSON"),
     ],
@@ -84,6 +94,32 @@ def test_what_is_no_json_is_said(tmp_path, content, words):
     path = tmp_path / "params.json"
     path.write_bytes(content)
     with pytest.raises(FileError, match=words):
+        load_params(path)
+
+
+def test_a_report_is_named_and_what_to_take_of_it(tmp_path):
+    path = tmp_path / "report.json"
+    params = ReliefParams(k=3, point_edits=[PointEdit(vertex=0, action="attach")])
+    report = make_relief(to_mesh(bust(8)), params, view=View(front="x")).report()
+    path.write_text(json.dumps(report))
+    with pytest.raises(FileError, match="is the report of a relief, not a parameter file: take everything"):
+        load_params(path)
+    path.write_text(json.dumps({name: report[name] for name in ("params", "view")}))
+    assert load_params(path) == (params, View(front="x"))
+
+
+@pytest.mark.parametrize("text", ['{"asset": {}, "meshes": []}', '{"k": 64}', "solid x", '{"input": 1}\n{}'])
+def test_what_is_wanted_is_said(tmp_path, text):
+    path = tmp_path / "other.json"
+    path.write_text(text)
+    with pytest.raises((FileError, ParameterError), match='wanted is an object with "params" and "view"'):
+        load_params(path)
+
+
+def test_a_long_value_is_cut(tmp_path):
+    path = tmp_path / "params.json"
+    path.write_text(json.dumps({"params": list(range(100_000))}))
+    with pytest.raises(ParameterError, match=r"Got \[0, 1, 2, .*\.\.\.\] instead"):
         load_params(path)
 
 

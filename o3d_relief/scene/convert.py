@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from os import PathLike
+
 import numpy as np
 import open3d as o3d
 from numpy.typing import ArrayLike, NDArray
@@ -9,10 +11,36 @@ from numpy.typing import ArrayLike, NDArray
 from o3d_relief.errors import MeshError
 from o3d_relief.limits import check_triangles
 
-__all__ = ["arrays_mesh", "mesh_arrays"]
+__all__ = ["arrays_mesh", "check_mesh", "mesh_arrays"]
 
 _LARGEST = 1e50
 """Squared areas of larger scenes, and of scenes smaller than the inverse, leave the range of float64."""
+
+
+def check_mesh(name: str, mesh: object) -> None:
+    """Check that something is an Open3D mesh.
+
+    Parameters
+    ----------
+    name : str
+        What it is called in the sentence.
+    mesh : object
+
+    Raises
+    ------
+    MeshError
+        It is none; the sentence says how to make one where that is known.
+    """
+    if isinstance(mesh, o3d.geometry.TriangleMesh):
+        return
+    kind, advice = f"{type(mesh).__module__}.{type(mesh).__qualname__}", ""
+    if isinstance(mesh, str | PathLike):
+        advice = ": read the file with read_mesh"
+    elif isinstance(mesh, o3d.t.geometry.TriangleMesh):
+        advice = ": take what its to_legacy() returns"
+    elif isinstance(getattr(mesh, "mesh", None), o3d.geometry.TriangleMesh):
+        advice = ": take its mesh"
+    raise MeshError(f"{name} must be an open3d.geometry.TriangleMesh. Got a {kind} instead{advice}.")
 
 
 def mesh_arrays(
@@ -40,9 +68,7 @@ def mesh_arrays(
         Not a TriangleMesh, too large for `max_triangles` or for the memory, no vertices, no triangles,
         indices out of range, or vertices of faces that are not finite or too large or small to compute with.
     """
-    if not isinstance(mesh, o3d.geometry.TriangleMesh):
-        kind = f"{type(mesh).__module__}.{type(mesh).__qualname__}"
-        raise MeshError(f"The scene must be an open3d.geometry.TriangleMesh. Got a {kind} instead.")
+    check_mesh("The scene", mesh)
     check_triangles(len(mesh.triangles), max_triangles)
     vertices = np.array(mesh.vertices, dtype=np.float64).reshape(-1, 3)
     faces = np.array(mesh.triangles, dtype=np.int64).reshape(-1, 3)

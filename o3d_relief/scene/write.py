@@ -10,6 +10,7 @@ import numpy as np
 from o3d_relief.errors import FileError, MeshError
 from o3d_relief.files import check_place, write_files
 from o3d_relief.scene.arrays import MeshArrays, from_open3d
+from o3d_relief.scene.convert import check_mesh
 from o3d_relief.scene.encode import encode_mesh
 
 if TYPE_CHECKING:
@@ -129,6 +130,7 @@ def mesh_files(path: str | Path, mesh: o3d.geometry.TriangleMesh) -> dict[str, b
         As for `write_mesh`.
     """
     path = Path(path)
+    check_mesh("The mesh to write", mesh)
     arrays = from_open3d(mesh)
     _check_arrays(path, arrays)
     return encode_mesh(arrays, path.name)

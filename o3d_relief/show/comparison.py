@@ -19,6 +19,10 @@ if TYPE_CHECKING:
 __all__ = ["comparison_sheet"]
 
 
+_ANOTHER_UNIT = 10.0
+"""Millimetres are by so much smaller than centimetres."""
+
+
 def comparison_sheet(
     meshes: Mapping[str, o3d.geometry.TriangleMesh],
     yaws: Sequence[float] = (0.0,),
@@ -31,7 +35,8 @@ def comparison_sheet(
     Parameters
     ----------
     meshes : mapping of str to open3d.geometry.TriangleMesh
-        By their titles; in the relief frame and in one unit. Each lies in the middle of its panels.
+        By their titles; in the relief frame and in one unit: where one is ten times as large as another, it
+        is taken for one in another unit. Each lies in the middle of its panels.
     yaws : sequence of float
         Degrees to the right of the front.
     plates : collection of str
@@ -46,7 +51,7 @@ def comparison_sheet(
     Raises
     ------
     ParameterError
-        No mesh, no view, or a plate for a mesh that is not there.
+        No mesh, no view, a plate for a mesh that is not there, or meshes in different units.
     MeshError
         A mesh without a triangle to draw.
     """
@@ -56,6 +61,7 @@ def comparison_sheet(
     if unknown:
         raise ParameterError(f"plates must be among {', '.join(meshes)}. Got {unknown[0]!r} instead.")
     boxes = {name: np.array([mesh.get_min_bound(), mesh.get_max_bound()]) for name, mesh in meshes.items()}
+    _check_unit(boxes)
     views = [view_direction(yaw) for yaw in yaws]
     framed = [_with_plate(box) if name in plates else box for name, box in boxes.items()]
     pairs = [(box, view) for box in framed for view in views]
@@ -72,6 +78,19 @@ def comparison_sheet(
     titles = list(meshes) + [""] * (len(pictures) - len(meshes))
     labels = [f"{yaw:g}°" for yaw in yaws] if len(yaws) > 1 else ()
     return contact_sheet(pictures, len(meshes), titles=titles, row_labels=labels)
+
+
+def _check_unit(boxes: Mapping[str, NDArray[np.float64]]) -> None:
+    """Refuse meshes whose larger sides (x or y) are as different as two units."""
+    sides = {name: float(np.ptp(box, axis=0)[:2].max()) for name, box in boxes.items()}
+    if min(sides.values()) <= 0.0:
+        return  # nothing to draw, which is said later
+    small, large = min(sides, key=sides.__getitem__), max(sides, key=sides.__getitem__)
+    if sides[small] * _ANOTHER_UNIT <= sides[large] * (1.0 + 1e-6):
+        raise ParameterError(
+            f"A comparison is drawn at one scale, but {large!r} is {sides[large]:.4g} large and {small!r} "
+            f"{sides[small]:.4g}: bring the meshes into one unit."
+        )
 
 
 def _with_plate(box: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -121,7 +121,7 @@ def _prepare(
     return Exposure(
         scene=scene,
         surface=surface,
-        corners=vertices[surface.faces],
+        tangents=np.einsum("fcj,fcj->fc", vertices[surface.faces], surface.corner_normals),
         paint=paint,
         lighting=lighting,
         axes=camera.axes.astype(np.float32),

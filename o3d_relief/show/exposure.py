@@ -59,8 +59,9 @@ class Exposure:
     ----------
     scene : RaycastingScene
     surface : Surface
-    corners : (m, 3, 3) float32
-        Corners of the faces, recentred and scaled to the unit box.
+    tangents : (m, 3) float32
+        Of each corner of each face, recentred and scaled to the unit box: its share along its normal, which
+        is where its tangent plane lies.
     paint : Paint
     lighting : Lighting
     axes : (3, 3) float32
@@ -75,7 +76,7 @@ class Exposure:
 
     scene: o3d.t.geometry.RaycastingScene
     surface: Surface
-    corners: Floats
+    tangents: Floats
     paint: Paint
     lighting: Lighting
     axes: Floats
@@ -121,10 +122,10 @@ class _Seen:
         flat = surface.normals[face]
         turned = flat @ axes[2] < 0.0
         self.behind = turned & ~surface.doubled[face]
-        sign = np.where(turned, np.float32(-1.0), np.float32(1.0))[:, None]
-        self.flat = flat * sign
-        self.corner_normals = surface.corner_normals[face] * sign[:, :, None]
-        self.normal = _towards(np.einsum("hcj,hc->hj", self.corner_normals, weights), axes[2])
+        self.sign = np.where(turned, np.float32(-1.0), np.float32(1.0))[:, None]
+        self.flat = flat * self.sign
+        blended = np.einsum("hcj,hc->hj", surface.corner_normals[face], weights * self.sign)
+        self.normal = _towards(blended, axes[2])
         self.camera_normal = np.zeros((*hit.shape, 3), dtype=np.float32)
         self.camera_normal[hit] = self.flat @ axes.T
 
@@ -173,10 +174,10 @@ class _Seen:
         Shadow rays from there do not show the facets where the light grazes: each point is moved out to
         the tangent planes of the corners, weighted by their nearness.
         """
-        place, normals = self.place[wanted], self.corner_normals[wanted]
-        corners = self.exposure.corners[self.face[wanted]]
-        above = np.einsum("hcj,hcj->hc", place[:, None, :] - corners, normals)
-        lift = -np.minimum(above, 0.0) * self.weights[wanted]
+        place, face, sign = self.place[wanted], self.face[wanted], self.sign[wanted]
+        normals = self.exposure.surface.corner_normals[face]
+        above = (np.einsum("hj,hcj->hc", place, normals) - self.exposure.tangents[face]) * sign
+        lift = np.minimum(above, 0.0) * self.weights[wanted] * -sign
         return np.asarray(place + np.einsum("hc,hcj->hj", lift, normals))
 
     def _sky_seen(self) -> Floats:

@@ -57,11 +57,12 @@ def occluded(
     """Tell which rays (r, 3) meet the scene within `length` times their direction's length."""
     import open3d as o3d
 
-    rays = np.hstack([origins, directions]).astype(np.float32)
+    rays = np.empty((len(origins), 6), dtype=np.float32)
+    rays[:, :3], rays[:, 3:] = origins, directions
     result = np.zeros(len(rays), dtype=bool)
-    good = np.isfinite(rays).all(axis=1)
-    if np.any(good):
-        tensor = o3d.core.Tensor.from_numpy(rays[good])
+    good = slice(None) if np.isfinite(rays).all() else np.isfinite(rays).all(axis=1)
+    if len(rays[good]):
+        tensor = o3d.core.Tensor.from_numpy(np.ascontiguousarray(rays[good]))
         result[good] = scene.test_occlusions(tensor, tnear=0.0, tfar=float(length), nthreads=1).numpy()
     return result
 
@@ -131,14 +132,17 @@ def smooth_over_tile(value: Floats, depth: Floats, normal: Floats, pixel: float,
         the tangent plane.
     """
     steps = range(-width // 2, width // 2)
-    for axis, slope in ((1, normal[..., 0]), (0, -normal[..., 1])):
+    right, upward, upright = (np.ascontiguousarray(normal[..., axis]) for axis in range(3))
+    for axis, slope in ((1, right), (0, -upward)):
         total = np.zeros_like(value)
         count = np.zeros_like(value)
         for step in steps:
             here, there = _shifted(axis, step)
-            gap = slope[here] * np.float32(step * pixel) + normal[..., 2][here] * (depth[there] - depth[here])
-            near = np.abs(gap) < 2.0 * pixel  # NaN is far
-            total[here] += np.where(near, value[there], np.float32(0.0))
+            gap = depth[there] - depth[here]
+            gap *= upright[here]
+            gap += slope[here] * np.float32(step * pixel)
+            near = np.abs(gap, out=gap) < 2.0 * pixel  # NaN is far
+            total[here] += value[there] * near
             count[here] += near
         value = total / np.maximum(count, np.float32(1.0))
     return value

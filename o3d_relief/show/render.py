@@ -201,14 +201,20 @@ def save_png(path: str | Path, image: NDArray[np.uint8]) -> None:
     ------
     FileError
         The folder is missing or cannot be written to.
+    ParameterError
+        Something else than a picture.
     """
+    if not isinstance(image, np.ndarray) or image.dtype != np.uint8 or image.shape[2:] != (3,):
+        found = f"{image.shape} {image.dtype}" if isinstance(image, np.ndarray) else repr(type(image))
+        raise ParameterError(f"image must be (height, width, 3) uint8. Got {found} instead.")
     content = BytesIO()
     Image.fromarray(image).save(content, format="PNG")
     write_bytes(path, content.getvalue())
 
 
 def _check_size(size: tuple[int, int], supersampling: int) -> None:
-    if len(size) != 2 or not all(isinstance(side, int) and 1 <= side <= 20_000 for side in size):
+    sides = tuple(size) if isinstance(size, Sequence) else ()
+    if len(sides) != 2 or not all(isinstance(side, int) and 1 <= side <= 20_000 for side in sides):
         raise ParameterError(f"size must be two whole numbers between 1 and 20000. Got {size!r} instead.")
     if not isinstance(supersampling, int) or not 1 <= supersampling <= 8:
         raise ParameterError(f"supersampling must be between 1 and 8. Got {supersampling!r} instead.")

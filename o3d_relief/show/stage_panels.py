@@ -20,6 +20,7 @@ from o3d_relief.records import (
     VisibilityStage,
     final_heights,
 )
+from o3d_relief.show.annotate import annotate
 from o3d_relief.show.camera import view_direction
 from o3d_relief.show.colors import label_colors
 from o3d_relief.show.easel import Easel, Pictures
@@ -35,6 +36,9 @@ OBLIQUE = view_direction(38.0, 12.0)
 _NEAR_FRONT = view_direction(22.0, 10.0)
 _SIDE = view_direction(65.0, 8.0)
 _GAP = 4  # pixels
+_STILL = 1e-9
+"""Relief units up to which nothing has moved and nothing stands out: there is no scale for that."""
+
 SEEN, HIDDEN = (0.93, 0.78, 0.42), (0.33, 0.45, 0.62)
 ACTIONS = {"attach": (0.16, 0.47, 0.71), "scale": (0.93, 0.66, 0.16), "discard": (0.78, 0.17, 0.20)}
 
@@ -47,6 +51,27 @@ def _bounds(*surfaces: NDArray[np.float64]) -> NDArray[np.float64]:
 def _close_up(vertices: NDArray[np.float64], worst: int) -> NDArray[np.float64]:
     """Return a box of 30 relief units around a vertex."""
     return np.array([vertices[worst] - 15.0, vertices[worst] + 15.0])
+
+
+def _pair(
+    easel: Easel,
+    surfaces: tuple[NDArray[np.float64], NDArray[np.float64]],
+    titles: tuple[str, str],
+    *,
+    direction: ArrayLike,
+    plate: bool = False,
+) -> Pictures:
+    """Draw a surface before and after, in one framing; only once where it is the same."""
+    bounds = _bounds(*surfaces)
+
+    def drawn(vertices: NDArray[np.float64], title: str) -> NDArray[np.uint8]:
+        mesh = easel.mesh(vertices)
+        return render(mesh, size=easel.size, direction=direction, plate=plate, bounds=bounds, title=title)
+
+    if not np.array_equal(*surfaces):
+        return [drawn(vertices, title) for vertices, title in zip(surfaces, titles, strict=True)]
+    picture = drawn(surfaces[0], " ")  # with room for a title
+    return [annotate(picture, title=title, legend=(), bar=None) for title in titles]
 
 
 def _scene(easel: Easel) -> Pictures:
@@ -62,12 +87,8 @@ def _scene(easel: Easel) -> Pictures:
 def _perspective(easel: Easel) -> Pictures:
     before, after = easel.record(SceneStage).vertices, easel.vertices
     changed = not np.array_equal(before, after)
-    bounds = _bounds(before, after)
     titles = ("before the forced perspective", "after" if changed else "after: no vanishing point, unchanged")
-    return [
-        render(easel.mesh(vertices), size=easel.size, direction=OBLIQUE, bounds=bounds, title=title)
-        for vertices, title in zip((before, after), titles, strict=True)
-    ]
+    return _pair(easel, (before, after), titles, direction=OBLIQUE)
 
 
 def _visibility(easel: Easel) -> Pictures:
@@ -127,7 +148,7 @@ def _attenuation(easel: Easel) -> Pictures:
     ]
     radius = _dot(easel, len(points))
     kept = record.action != "discard"
-    top = max(float(record.new_height[kept].max(initial=0.0)), 1e-9)
+    top = float(record.new_height[kept].max(initial=0.0))
     old = float(record.height[kept].max(initial=0.0))
     actions = render(
         mesh,
@@ -142,11 +163,12 @@ def _attenuation(easel: Easel) -> Pictures:
         mesh,
         size=easel.size,
         points=points[kept],
-        point_field=record.new_height[kept],
+        point_field=record.new_height[kept] if top > _STILL else None,
+        point_colors=None if top > _STILL else ACTIONS["attach"],
         point_radius=radius,
         field_range=(0.0, top),
         field_label="new height",
-        title=f"new heights: up to {top:.1f}, before up to {old:.1f}",
+        title=f"new heights: {f'up to {top:.1f}' if top > _STILL else 'all 0'}, before up to {old:.1f}",
     )
     return [actions, heights]
 
@@ -165,14 +187,16 @@ def _restoration(easel: Easel) -> Pictures:
     """Draw the errors on the left; on the right, one above the other, the worst visible place in close-up."""
     record = easel.record(RestorationStage)
     before, after = easel.raised(easel.record(ConstructionStage).z), easel.raised(record.z)
+    largest = float(record.order_error.max(initial=0.0))
     error = render(
         easel.mesh(before),
         size=easel.size,
-        field=record.order_error,
-        field_range=(0.0, max(float(record.order_error.max(initial=0.0)), 1e-9)),
+        field=record.order_error if largest > _STILL else None,
+        field_range=(0.0, largest),
         colormap="heat",
         field_label="order error",
-        title=f"depth order errors, {int(record.solved.sum())} vertices solved again",
+        title=f"{'' if largest > _STILL else 'no '}depth order errors, "
+        f"{int(record.solved.sum())} vertices solved again",
     )
     worst = int(np.argmax(record.order_error * record.solved * easel.record(VisibilityStage).visible))
     bounds = _close_up(before, worst) if np.any(record.solved) else _bounds(before, after)
@@ -194,7 +218,10 @@ def _order(easel: Easel) -> Pictures:
     restored = easel.record(RestorationStage).z
     before, after = easel.raised(restored), easel.raised(record.z)
     moved = record.z - restored
-    largest = max(float(np.abs(moved).max()), 1e-9)
+    largest = float(np.abs(moved).max())
+    if largest <= _STILL:
+        titles = ("before", "in order: nothing had to be moved")
+        return _pair(easel, (before, before), titles, direction=_FRONT, plate=True)
     bounds = _bounds(before, after)
     count = record.counts.get("pairs_corrected", 0)
     return [
@@ -216,13 +243,11 @@ def _order(easel: Easel) -> Pictures:
 def _compression(easel: Easel) -> Pictures:
     record = easel.record(CompressionStage)
     before, after = easel.raised(easel.record(OrderStage).z), easel.raised(record.z)
-    bounds = _bounds(before, after)
-    depths = [f"{name}: depth {z.max():.1f}" for name, z in (("before", before[:, 2]), ("after", record.z))]
-    depths[0] = f"compression, {depths[0]}"
-    return [
-        render(easel.mesh(vertices), size=easel.size, direction=_SIDE, plate=True, bounds=bounds, title=title)
-        for vertices, title in zip((before, after), depths, strict=True)
-    ]
+    titles = (
+        f"compression, before: depth {before[:, 2].max():.1f}",
+        f"after: depth {record.z.max():.1f}",
+    )
+    return _pair(easel, (before, after), titles, direction=_SIDE, plate=True)
 
 
 def _bounded(easel: Easel) -> Pictures:
@@ -242,15 +267,16 @@ def _bounded(easel: Easel) -> Pictures:
     )
     moved = record.z - easel.vertices[:, 2]
     after = easel.raised(np.maximum(record.z, 0.0))
+    still = np.ptp(moved) <= _STILL
     title = f"bounded: depth {np.ptp(easel.vertices[:, 2]):.1f} before, {record.z.max():.1f} after"
     result = render(
         easel.mesh(after),
         size=easel.size,
         direction=OBLIQUE,
         plate=True,
-        field=moved,
+        field=None if still else moved,
         field_label="moved",
-        title=title,
+        title=f"{title}, shape unchanged" if still else title,
     )
     return [counted, result]
 

@@ -1,4 +1,4 @@
-"""What a solid will measure, before the work."""
+"""What a relief or a solid will measure, before the work."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from o3d_relief.plate_params import PlateParams
 from o3d_relief.rays import unit_box
 from o3d_relief.scene.convert import mesh_arrays
 from o3d_relief.scene.frame import to_relief_units
-from o3d_relief.solid.sizes import scale_for
+from o3d_relief.solid.sizes import check_extents, scale_for
 from o3d_relief.steps import frame_step, perspective_step, visibility_step, visible_depth
 
-__all__ = ["Estimate", "estimate_solid", "relief_depth"]
+__all__ = ["Estimate", "estimate_relief", "estimate_solid", "relief_depth"]
 
 _LINES = 256
 """Lines along x and along y that measure how high the scene stands."""
@@ -33,25 +33,26 @@ class Estimate:
 
     Attributes
     ----------
-    size_mm : (x, y, z)
-        Width and height; x, and z where a depth was asked for, are what the solid will measure. The
-        rest can be smaller: parts that end behind the relief plane are cut off.
+    size : (x, y, z)
+        In millimetres for a solid, in the input's unit for a relief alone. Of a solid x, and z where a depth
+        was asked for, are what it will measure. The rest can be smaller: parts that end behind the relief
+        plane are cut off.
     visible_depth : float
         Depth of what is visible of the scene, in the input's unit.
     depth_known : bool
         False where no depth was asked for; z is then that of the scene, the most that it can be.
-    volume_mm3 : float
-        Roughly.
+    volume_mm3 : float or None
+        Roughly; None for a relief alone, which is a surface.
     triangles : int
-        Of the scene; the solid has about as many.
+        Of the scene; what is made of it has about as many.
     memory_mb : float
         Peak memory of the whole work, roughly, in megabytes.
     """
 
-    size_mm: tuple[float, float, float]
+    size: tuple[float, float, float]
     visible_depth: float
     depth_known: bool
-    volume_mm3: float
+    volume_mm3: float | None
     triangles: int
     memory_mb: float
 
@@ -75,33 +76,75 @@ def estimate_solid(
     Raises
     ------
     MeshError
-        A mesh from which no relief can be made.
+        A mesh from which no relief, or no solid, can be made.
     """
     vertices, faces, unit = _seen(mesh, view)
     used = vertices[np.unique(faces)]
+    check_extents(used)
     scale = scale_for(used[:, :2], plate)
     width, height, scene_depth = np.ptp(used, axis=0) * scale
     seen_depth = visible_depth(vertices, visibility_step(vertices, faces, view).visible) * unit
-    wanted_depth = params.settled(seen_depth).depth
-    depth, known = scene_depth, False
+    depth, known = _depth(params, seen_depth, scene_depth, scale / unit)
     if plate.depth_mm is not None:
         depth, known = plate.depth_mm - plate.back_mm, True
-    elif wanted_depth is not None:
-        wanted = cast(float, wanted_depth) / unit * scale
-        depth, known = min(depth, wanted), wanted <= depth
     covered, mean_height = _front(vertices, faces)
     total_height = (plate.width_mm - 2.0 * plate.edge_mm) * height / width + 2.0 * plate.edge_mm
     share = {"rectangle": 1.0, "ellipse": np.pi / 4.0, "contour": covered, "none": 0.0}[plate.shape]
     volume = plate.width_mm * total_height * share * plate.back_mm
     volume += width * height * covered * mean_height * depth * (_BOUNDED if params.bounded else _ATTENUATED)
     return Estimate(
-        size_mm=(plate.width_mm, float(total_height), float(depth + plate.back_mm)),
+        size=(plate.width_mm, float(total_height), float(depth + plate.back_mm)),
         visible_depth=seen_depth,
         depth_known=known,
         volume_mm3=float(volume),
         triangles=len(faces),
-        memory_mb=_MEGABYTES + _BYTES_PER_TRIANGLE * len(faces) / 1e6,
+        memory_mb=_memory_mb(faces),
     )
+
+
+def estimate_relief(mesh: o3d.geometry.TriangleMesh, params: ReliefParams, view: View) -> Estimate:
+    """Estimate the measures of a relief without a plate from the scene alone.
+
+    Parameters
+    ----------
+    mesh : open3d.geometry.TriangleMesh
+    params : ReliefParams
+    view : View
+
+    Returns
+    -------
+    Estimate
+
+    Raises
+    ------
+    MeshError
+        A mesh from which no relief can be made.
+    """
+    vertices, faces, unit = _seen(mesh, view)
+    width, height, scene_depth = np.ptp(vertices[np.unique(faces)], axis=0) * unit
+    seen_depth = visible_depth(vertices, visibility_step(vertices, faces, view).visible) * unit
+    depth, known = _depth(params, seen_depth, scene_depth, 1.0)
+    return Estimate(
+        size=(float(width), float(height), depth),
+        visible_depth=seen_depth,
+        depth_known=known,
+        volume_mm3=None,
+        triangles=len(faces),
+        memory_mb=_memory_mb(faces),
+    )
+
+
+def _depth(params: ReliefParams, seen_depth: float, most: float, scale: float) -> tuple[float, bool]:
+    """Return the depth that was asked for, in the input's unit times `scale`, and whether it will be met."""
+    wanted = params.settled(seen_depth).depth
+    if wanted is None:
+        return float(most), False
+    scaled = cast(float, wanted) * scale
+    return float(min(most, scaled)), bool(scaled <= most)
+
+
+def _memory_mb(faces: NDArray[np.int64]) -> float:
+    return _MEGABYTES + _BYTES_PER_TRIANGLE * len(faces) / 1e6
 
 
 def relief_depth(mesh: o3d.geometry.TriangleMesh, view: View, plate: PlateParams) -> float | None:

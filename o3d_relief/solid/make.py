@@ -73,7 +73,7 @@ def make_solid(
     MeshError
         Nothing of the relief encloses a volume.
     ParameterError
-        A plate too small for what it is to hang from.
+        A plate too small for what it is to hang from, or something else than a relief and a plate.
     Cancelled
         `on_progress` returned False.
 
@@ -89,6 +89,9 @@ def make_solid(
     params = PlateParams() if params is None else params
     if not isinstance(params, PlateParams):
         raise ParameterError(f"params must be a PlateParams. Got {params!r} instead.")
+    if not hasattr(relief, "stages"):
+        kind = f"{type(relief).__module__}.{type(relief).__qualname__}"
+        raise ParameterError(f"relief must be a Relief, as make_relief returns. Got a {kind} instead.")
     progress = Progress(on_progress)
     progress.begin("solid")
     solid = solid_of(from_open3d(relief.mesh), params, tick=progress.tick)

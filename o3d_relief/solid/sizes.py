@@ -12,7 +12,14 @@ from o3d_relief.errors import MeshError
 from o3d_relief.plate_params import PlateParams
 from o3d_relief.solid.pieces import Piece
 
-__all__ = ["fitted", "scale_for", "shortfall", "to_millimetres"]
+__all__ = ["check_extents", "fitted", "scale_for", "shortfall", "to_millimetres"]
+
+
+def check_extents(points: NDArray[np.float64]) -> None:
+    """Refuse points (n, 3) of a relief that have no extent along x or y, or do not rise above z = 0."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    if high[0] <= low[0] or high[1] <= low[1] or high[2] <= 0.0:
+        raise MeshError("The relief has no width or no depth: it cannot become a solid.")
 
 
 def scale_for(points: NDArray[np.float64], params: PlateParams) -> float:
@@ -67,9 +74,8 @@ def to_millimetres(
         A relief without width or depth.
     """
     used = vertices[np.unique(faces)]
+    check_extents(used)
     low, high = used.min(axis=0), used.max(axis=0)
-    if high[0] <= low[0] or high[1] <= low[1] or high[2] <= 0.0:
-        raise MeshError("The relief has no width or no depth: it cannot become a solid.")
     scale = scale_for(used[:, :2], params)
     ratio = 1.0
     if params.depth_mm is not None:

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from o3d_relief.errors import ParameterError
+from o3d_relief.errors import MeshError, ParameterError
 from o3d_relief.show.comparison import comparison_sheet
 from shapes import grid, sphere, to_mesh
 
@@ -37,6 +37,23 @@ def test_panels_are_no_wider_than_the_views(meshes):
     assert plated.shape[0] > comparison_sheet({"a": flat}, panel=(100, 100)).shape[0]
 
 
+@pytest.mark.parametrize("factor", [10.0, 1e-3])
+def test_other_units_are_refused(meshes, factor):
+    other = to_mesh(sphere(8)).scale(factor, (0.0, 0.0, 0.0))
+    names = (
+        "'ball' is 100 large and 'other' 0.1"
+        if factor < 1.0
+        else "'other' is 1000 large and '(ball|sheet)' 100"
+    )
+    with pytest.raises(ParameterError, match=f"{names}: bring the meshes into one unit"):
+        comparison_sheet({**meshes, "other": other}, panel=(50, 50))
+
+
+def test_sizes_of_one_unit_are_not_refused(meshes):
+    other = to_mesh(sphere(8)).scale(0.11, (0.0, 0.0, 0.0))
+    assert comparison_sheet({**meshes, "other": other}, panel=(50, 50)).shape[1] == 166
+
+
 def test_errors(meshes):
     with pytest.raises(ParameterError, match="needs a mesh and a view"):
         comparison_sheet({})
@@ -44,3 +61,5 @@ def test_errors(meshes):
         comparison_sheet(meshes, ())
     with pytest.raises(ParameterError, match=r"among ball, sheet\. Got 'cube' instead"):
         comparison_sheet(meshes, plates=["cube"])
+    with pytest.raises(MeshError, match="no triangles"):
+        comparison_sheet({**meshes, "nothing": type(meshes["ball"])()})

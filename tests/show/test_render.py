@@ -456,6 +456,7 @@ def test_a_mesh_that_cannot_be_drawn_raises(vertices, faces, message):
     ("options", "message"),
     [
         ({"size": (0, 10)}, "size"),
+        ({"size": 16}, "size must be two whole numbers"),
         ({"supersampling": 0}, "supersampling"),
         ({"direction": (0, 0, 0)}, "direction"),
         ({"light": (np.nan, 0, 0)}, "light"),
@@ -506,8 +507,9 @@ def test_save_png_leaves_nothing_behind_when_it_fails(tmp_path):
 def test_save_png_keeps_the_old_file_when_the_picture_is_bad(tmp_path):
     target = tmp_path / "picture.png"
     target.write_bytes(b"old")
-    with pytest.raises(TypeError):
-        save_png(target, np.zeros((2, 2, 7), dtype=np.uint8))
+    for image in (np.zeros((2, 2, 7), dtype=np.uint8), np.zeros((2, 2, 3)), [[0]]):
+        with pytest.raises(ParameterError, match=r"image must be \(height, width, 3\) uint8"):
+            save_png(target, image)
     assert [path.name for path in tmp_path.iterdir()] == ["picture.png"]
     assert target.read_bytes() == b"old"
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import open3d as o3d
 import pytest
@@ -21,6 +23,8 @@ from o3d_relief.records import (
     TrimStage,
     VisibilityStage,
 )
+from o3d_relief.show import stage_panels
+from o3d_relief.show.render import render
 from o3d_relief.show.sheets import contact_sheet, save_stage_pictures, stage_picture, view_sheet
 
 NAMES = [
@@ -278,3 +282,56 @@ def test_saving_into_a_missing_folder_raises(stages, tmp_path):
     with pytest.raises(FileError, match="does not exist"):
         save_stage_pictures(stages, tmp_path / "nowhere", size=SIZE)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """Return the options of each render, as they come."""
+    options = []
+    monkeypatch.setattr(stage_panels, "render", lambda *a, **o: options.append(o) or render(*a, **o))
+    return options
+
+
+@pytest.mark.parametrize("name", ["perspective", "order", "compression"])
+def test_what_is_the_same_before_and_after_is_drawn_once(stages, drawn, name):
+    z = stages["restoration"].z
+    same = {
+        **stages,
+        "perspective": PerspectiveStage(vertices=stages["scene"].vertices.copy()),
+        "order": OrderStage(z=z.copy()),
+        "compression": CompressionStage(alpha=np.ones(len(z)), z=z.copy()),
+    }
+    image = stage_picture(name, same, size=(408, 200))
+    assert len(drawn) == 1
+    assert np.array_equal(image[30:, :200], image[30:, 208:])  # below the titles
+    assert not np.array_equal(image[:30, :200], image[:30, 208:])
+    stage_picture(name, stages, size=SIZE)
+    assert len(drawn) == 3
+
+
+@pytest.mark.parametrize(
+    ("name", "field", "title"),
+    [
+        ("attenuation", "point_field", "new heights: all 0, "),
+        ("restoration", "field", "no depth order errors"),
+        ("bounded", "field", ", shape unchanged"),
+    ],
+)
+def test_no_scale_where_nothing_stands_out(stages, drawn, name, field, title):
+    z, n = stages["perspective"].vertices[:, 2], len(stages["scene"].vertices)
+    weight = np.ones(len(stages["scene"].faces))
+    bounded = BoundedStage(face_weight=weight, attached=np.array([3]), z=0.3 * z)
+    restored = stages["restoration"]
+    moving = {**stages, "bounded": bounded}
+    still = {
+        "attenuation": dataclasses.replace(stages["attenuation"], new_height=np.zeros(4)),
+        "restoration": dataclasses.replace(restored, order_error=np.zeros(n), solved=np.zeros(n, dtype=bool)),
+        "bounded": dataclasses.replace(bounded, z=z - 2.0),
+    }
+    for record, moves in ((moving[name], True), (still[name], False)):
+        drawn.clear()
+        stage_picture(name, {**stages, name: record}, size=SIZE)
+        labels = ("new height", "order error", "moved")
+        panel = next(options for options in drawn if options.get("field_label") in labels)
+        assert (panel[field] is not None) == moves
+        assert (title in panel["title"]) != moves

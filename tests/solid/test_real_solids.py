@@ -49,5 +49,5 @@ def test_a_relief_of_the_right_depth_is_not_stretched(data_folder):
     solid = rel.make_solid(rel.make_relief(mesh, asked, view=view), params)
     assert solid.counts["depth_ratio"] == pytest.approx(1.0, abs=0.02)
     estimate = estimate_solid(mesh, asked, view, params)
-    np.testing.assert_allclose(solid.size, estimate.size_mm, rtol=0.02)
+    np.testing.assert_allclose(solid.size, estimate.size, rtol=0.02)
     assert estimate.volume_mm3 == pytest.approx(solid.volume, rel=0.3)
