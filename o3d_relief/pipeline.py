@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from o3d_relief.attenuation_step import attenuation_step
 from o3d_relief.bounded_step import bounded_step
-from o3d_relief.bounds.lines import Lines
+from o3d_relief.bounds.ahead import Ahead
 from o3d_relief.bounds.near_points import NearPoints
 from o3d_relief.errors import MeshError, ParameterError
 from o3d_relief.journal import Journal, OnStage
 from o3d_relief.linalg.laplacian import cotangent_laplacian
 from o3d_relief.memory import memory_kept
-from o3d_relief.order_step import order_step
+from o3d_relief.order_step import order_ahead, order_step
 from o3d_relief.output import trimmed_mesh
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.progress import OnProgress
@@ -35,12 +35,12 @@ from o3d_relief.steps import (
     frame_step,
     perspective_step,
     scene_step,
-    stacked_pairs,
     trim_step,
     turned_to_viewer,
     visibility_step,
     visible_depth,
 )
+from o3d_relief.threads import one_beside
 
 __all__ = ["make_relief"]
 
@@ -132,9 +132,10 @@ def make_relief(
     if params.bounded:
         z = journal.keep(bounded_step(vertices, faces, visible, scene, settled, tick=journal.tick)).z
     else:
-        z = _attenuated(
-            vertices, visible, laplacian, slivers, scene, Lines(vertices, faces, box), settled, journal
-        )
+        with one_beside() as thread:
+            ahead = order_ahead(thread, vertices, faces, laplacian, box, settled)
+            z = _attenuated(vertices, visible, laplacian, slivers, scene, ahead, settled, journal)
+        del ahead
     del box  # it takes much of the memory, and no more rays are cast through it
 
     journal.begin("trim")
@@ -174,7 +175,7 @@ def _attenuated(
     laplacian: sp.csr_array,
     slivers: int,
     scene: SceneStage,
-    lines: Lines,
+    ahead: Ahead | None,
     params: ReliefParams,
     journal: Journal,
 ) -> NDArray[np.float64]:
@@ -184,11 +185,9 @@ def _attenuated(
     journal.begin("attenuation")
     points = journal.keep(attenuation_step(vertices, visible, scene, clusters, params))
     journal.begin("construction")
-    pairs = stacked_pairs(lines, params)
+    springs = None if ahead is None else ahead.springs
     z = journal.keep(
-        construction_step(
-            vertices, faces, visible, laplacian, slivers, clusters, points, pairs, tick=journal.tick
-        )
+        construction_step(vertices, visible, laplacian, slivers, clusters, points, springs, tick=journal.tick)
     ).z
     journal.begin("restoration")
     around = NearPoints(vertices, faces, visible, points.kept_index)
@@ -203,8 +202,7 @@ def _attenuated(
         laplacian,
         restored,
         around,
-        lines,
-        pairs,
+        ahead,
         params,
         scene.unit,
         tick=journal.tick,
