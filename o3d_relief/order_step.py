@@ -2,45 +2,22 @@
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
-
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from o3d_relief.bounds.ahead import Ahead
-from o3d_relief.bounds.lines import Lines
 from o3d_relief.bounds.near_points import NearPoints
 from o3d_relief.bounds.order import Ordered, keep_order
 from o3d_relief.params import ReliefParams
 from o3d_relief.progress import Tick, silent
-from o3d_relief.rays import UnitBox
 from o3d_relief.records import OrderStage, RestorationStage
 from o3d_relief.steps import on_plane, ratios
 
-__all__ = ["order_ahead", "order_step"]
-
-_LINES = 256
-"""Lines along x and along y on which the order is kept, besides those through vertices and crossings."""
+__all__ = ["order_step"]
 
 _STIFFER = (10.0, 100.0)
 """How much stiffer still the surface is at the points than in the restoration: corrections go elsewhere."""
-
-
-def order_ahead(
-    thread: Executor,
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    laplacian: sp.csr_array,
-    box: UnitBox | None,
-    params: ReliefParams,
-) -> Ahead | None:
-    """Begin with what the order needs of the scene, in another thread; None where the order is not kept."""
-    if not params.in_order:
-        return None
-    # For a smallest gap, which need not be least at vertices and silhouettes, the grid is a fine one.
-    side = _LINES if params.min_gap == 0.0 else 4 * _LINES
-    return Ahead(thread, vertices, faces, laplacian, Lines(vertices, faces, box), side=side)
 
 
 def order_step(

@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from o3d_relief.attenuation_step import attenuation_step
 from o3d_relief.bounded_step import bounded_step
 from o3d_relief.bounds.ahead import Ahead
+from o3d_relief.bounds.lines import Lines
 from o3d_relief.bounds.near_points import NearPoints
 from o3d_relief.errors import MeshError, ParameterError
 from o3d_relief.journal import Journal, OnStage
 from o3d_relief.linalg.laplacian import cotangent_laplacian
 from o3d_relief.memory import memory_kept
-from o3d_relief.order_step import order_ahead, order_step
+from o3d_relief.order_step import order_step
 from o3d_relief.output import trimmed_mesh
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.progress import OnProgress
@@ -35,6 +36,7 @@ from o3d_relief.steps import (
     frame_step,
     perspective_step,
     scene_step,
+    stacked_pairs,
     trim_step,
     turned_to_viewer,
     visibility_step,
@@ -122,21 +124,31 @@ def make_relief(
     faces = scene.faces
     journal.begin("perspective")
     vertices = journal.keep(perspective_step(scene.vertices, view)).vertices
-    journal.begin("visibility")
-    # Who keeps the order casts more rays through the scene.
-    box = UnitBox(vertices, faces) if params.in_order and not params.bounded else None
-    visible = journal.keep(visibility_step(vertices, faces, view, box)).visible
-    settled = params.settled(visible_depth(vertices, visible) * scene.unit)
-    journal.begin("bounded" if params.bounded else "clusters")
-    laplacian, slivers = cotangent_laplacian(vertices, faces)
-    if params.bounded:
-        z = journal.keep(bounded_step(vertices, faces, visible, scene, settled, tick=journal.tick)).z
-    else:
-        with one_beside() as thread:
-            ahead = order_ahead(thread, vertices, faces, laplacian, box, settled)
-            z = _attenuated(vertices, visible, laplacian, slivers, scene, ahead, settled, journal)
-        del ahead
-    del box  # it takes much of the memory, and no more rays are cast through it
+    keeps_order = params.in_order and not params.bounded
+    with one_beside() as thread:
+        ahead = Ahead(thread, vertices, faces) if keeps_order else None
+        journal.begin("visibility")
+        # Who keeps the order casts more rays through the scene.
+        box = UnitBox(vertices, faces) if keeps_order else None
+        visible = journal.keep(visibility_step(vertices, faces, view, box)).visible
+        settled = params.settled(visible_depth(vertices, visible) * scene.unit)
+        journal.begin("bounded" if params.bounded else "clusters")
+        laplacian, slivers = cotangent_laplacian(vertices, faces)
+        if params.bounded:
+            z = journal.keep(bounded_step(vertices, faces, visible, scene, settled, tick=journal.tick)).z
+        else:
+            z = _attenuated(
+                vertices,
+                visible,
+                laplacian,
+                slivers,
+                scene,
+                Lines(vertices, faces, box),
+                ahead,
+                settled,
+                journal,
+            )
+    del box, ahead  # they take much of the memory, and no more rays are cast
 
     journal.begin("trim")
     out_faces, turned = turned_to_viewer(in_faces, scene, vertices, visible, laplacian)
@@ -175,6 +187,7 @@ def _attenuated(
     laplacian: sp.csr_array,
     slivers: int,
     scene: SceneStage,
+    lines: Lines,
     ahead: Ahead | None,
     params: ReliefParams,
     journal: Journal,
@@ -185,9 +198,13 @@ def _attenuated(
     journal.begin("attenuation")
     points = journal.keep(attenuation_step(vertices, visible, scene, clusters, params))
     journal.begin("construction")
-    springs = None if ahead is None else ahead.springs
+    pairs = stacked_pairs(lines, params)
+    if ahead is not None and pairs is not None:
+        ahead.stack(lines, pairs, laplacian, fine=params.min_gap > 0.0)
     z = journal.keep(
-        construction_step(vertices, visible, laplacian, slivers, clusters, points, springs, tick=journal.tick)
+        construction_step(
+            vertices, faces, visible, laplacian, slivers, clusters, points, pairs, tick=journal.tick
+        )
     ).z
     journal.begin("restoration")
     around = NearPoints(vertices, faces, visible, points.kept_index)

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from o3d_relief.attenuation_step import beta_of_clusters
-from o3d_relief.bounds.parts import PartSprings
+from o3d_relief.bounds.lines import Lines
+from o3d_relief.bounds.pairs import Pairs, vertex_pairs
+from o3d_relief.bounds.parts import tie_parts
 from o3d_relief.errors import MeshError, ParameterError
 from o3d_relief.params import ReliefParams, Triple, View
 from o3d_relief.progress import Tick, silent
@@ -134,24 +136,29 @@ def _behind(z: NDArray[np.float64], visible: NDArray[np.bool_]) -> int:
     return int((z[visible] < 0.0).sum())
 
 
+def stacked_pairs(lines: Lines, params: ReliefParams) -> Pairs | None:
+    """Find what must keep its order at the vertices; None where the order is not kept."""
+    return vertex_pairs(lines) if params.in_order else None
+
+
 def construction_step(
     vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
     visible: NDArray[np.bool_],
     laplacian: sp.csr_array,
     slivers: int,
     clusters: ClustersStage,
     points: AttenuationStage,
-    springs: PartSprings | None,
+    pairs: Pairs | None,
     *,
     tick: Tick = silent,
 ) -> ConstructionStage:
     """Rebuild the surface around the points, with its loose parts tied to the rest."""
     ties = None
-    if springs is not None:
-        _, label = connected_components(laplacian, directed=False)
-        held = np.isin(label, label[points.kept_index])
-        beta = beta_of_clusters(points, len(clusters.centers))[clusters.labels[springs.stacked.upper[:, 0]]]
-        ties = springs.ties(held, attenuate(springs.stacked.gap, beta))
+    if pairs is not None:
+        beta = beta_of_clusters(points, len(clusters.centers))[clusters.labels[pairs.upper[:, 0]]]
+        shrink = attenuate(pairs.gap, beta)
+        ties = tie_parts(vertices, faces, laplacian, points.kept_index, pairs, shrink)
     built = construct(
         vertices,
         laplacian,

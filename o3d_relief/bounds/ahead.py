@@ -11,18 +11,22 @@ from numpy.typing import NDArray
 from o3d_relief.bounds.between import Between
 from o3d_relief.bounds.columns import column_pairs
 from o3d_relief.bounds.lines import Lines
-from o3d_relief.bounds.pairs import Pairs, close_pairs, vertex_pairs
-from o3d_relief.bounds.parts import PartSprings, find_springs
+from o3d_relief.bounds.pairs import Pairs, close_pairs
 from o3d_relief.bounds.silhouettes import edges_that_turn, silhouette_pairs
 from o3d_relief.linalg.laplacian import vertex_areas
+from o3d_relief.memory import give_back
 
 __all__ = ["Ahead"]
 
+_LINES = 256
+"""Lines along x and along y on which the order is kept, besides those through vertices and crossings."""
+
 
 class Ahead:
-    """Finds what depends on the scene alone, in another thread, in the order in which it is needed.
+    """Finds what depends on the scene alone, in another thread.
 
-    Whoever asks for anything waits until it is there. An error of the other thread is raised then.
+    Whoever asks for anything waits until it is there. An error of the other thread is raised then. The
+    silhouettes are looked at from the start: they need much memory, as the construction does later on.
 
     Parameters
     ----------
@@ -31,52 +35,41 @@ class Ahead:
     vertices : (n, 3) float64
         In the relief frame, in relief units.
     faces : (m, 3) int64
-    laplacian : (n, n) sparse float64
-        The cotangent Laplacian, whose graph tells the parts.
-    lines : Lines
-        Of the mesh; nobody else may use it.
-    side : int
-        Lines of a grid along x and along y on which the order is kept, besides those through vertices and
-        crossings.
     """
 
-    def __init__(
-        self,
-        thread: Executor,
-        vertices: NDArray[np.float64],
-        faces: NDArray[np.int64],
-        laplacian: sp.csr_array,
-        lines: Lines,
-        *,
-        side: int,
-    ) -> None:
-        def springs() -> PartSprings | None:
-            return find_springs(vertices, faces, laplacian, stacked.result())
+    def __init__(self, thread: Executor, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
+        self._thread, self._vertices, self._faces = thread, vertices, faces
+        self._turns = thread.submit(edges_that_turn, vertices, faces)
+        self._silhouettes = thread.submit(lambda: silhouette_pairs(vertices, faces, self._turns.result()))
+        self._areas = thread.submit(vertex_areas, vertices, faces)
+        thread.submit(give_back)
+
+    def stack(self, lines: Lines, stacked: Pairs, laplacian: sp.csr_array, *, fine: bool) -> None:
+        """Go on with what needs more than the mesh.
+
+        Parameters
+        ----------
+        lines : Lines
+            Of the mesh; nobody else may use it from now on.
+        stacked : Pairs
+            At the vertices.
+        laplacian : (n, n) sparse float64
+            The cotangent Laplacian, whose graph tells the parts.
+        fine : bool
+            Keep the order on four times as many lines along x and along y: a gap need not be least at
+            vertices and silhouettes.
+        """
+        silhouettes = self._silhouettes.result()
 
         def pairs() -> Pairs:
-            silhouettes = silhouette_pairs(vertices, faces, turns.result())
-            grid = column_pairs(lines, side=side)
-            return Pairs.join([stacked.result(), silhouettes, close_pairs(lines), grid])
+            grid = column_pairs(lines, side=4 * _LINES if fine else _LINES)
+            return Pairs.join([stacked, silhouettes, close_pairs(lines), grid])
 
-        def between() -> Between:
-            return Between(vertices, faces, laplacian, turns.result()[0])
-
-        stacked = thread.submit(vertex_pairs, lines)
-        self._springs = thread.submit(springs)
-        turns = thread.submit(edges_that_turn, vertices, faces)
-        self._pairs = thread.submit(pairs)
-        self._areas = thread.submit(vertex_areas, vertices, faces)
-        self._between = thread.submit(between)
-
-    @property
-    def springs(self) -> PartSprings | None:
-        """What ties the parts of the scene to each other, None where it is one."""
-        return self._springs.result()
-
-    @property
-    def pairs(self) -> Pairs:
-        """What must stay in order, on all lines."""
-        return self._pairs.result()
+        self._pairs = self._thread.submit(pairs)
+        self._between = self._thread.submit(
+            lambda: Between(self._vertices, self._faces, laplacian, self._turns.result()[0])
+        )
+        self._thread.submit(give_back)
 
     @property
     def areas(self) -> NDArray[np.float64]:
@@ -84,6 +77,11 @@ class Ahead:
         return self._areas.result()
 
     @property
+    def pairs(self) -> Pairs:
+        """What must stay in order, on all lines; after `stack`."""
+        return self._pairs.result()
+
+    @property
     def between(self) -> Between:
-        """What looks for what is out of order between the lines."""
+        """What looks for what is out of order between the lines; after `stack`."""
         return self._between.result()
