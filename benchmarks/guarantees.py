@@ -2,10 +2,10 @@
 
 FOLDER holds the meshes and a MANIFEST.tsv with the columns `file`, `suggested_view_from` and `up`. Each
 relief is made once with the guarantees and once as the paper has it, and everything is counted on the
-finished mesh by its certificate. The seconds of the guarantees are those that come on top of the paper's. Some
-of their work is done beside the rest: on the wall they are fewer where the machine is idle otherwise. Each
-row is printed, and written to OUTPUT/guarantees.json, as it is made; rows that are there already are kept,
-delete the file to measure anew.
+finished mesh by its certificate. The seconds of the guarantees are those that come on top of the paper's.
+Some of their work is done beside the rest: on the wall they are fewer where the machine is idle otherwise.
+Each row is printed, and written to OUTPUT/guarantees.json, as it is made; rows that are there already are
+kept, delete the file to measure anew.
 """
 
 from __future__ import annotations
