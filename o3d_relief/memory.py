@@ -9,7 +9,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-__all__ = ["memory_kept"]
+__all__ = ["give_back", "memory_kept"]
 
 _TRIM_THRESHOLD, _MMAP_THRESHOLD, _MMAP_MAX = -1, -3, -4
 """Names of settings in glibc's malloc.h."""
@@ -67,6 +67,16 @@ def memory_kept() -> Iterator[None]:
         yield
     finally:
         _blocks.leave(mallopt, malloc_trim)
+
+
+def give_back() -> None:
+    """Give back what is free within a block of `memory_kept`, in all threads.
+
+    What a thread beside the main one has freed, nobody else can use.
+    """
+    calls = _calls()
+    if calls is not None:
+        calls[1](0)
 
 
 def _calls() -> tuple[Callable[[int, int], int], Callable[[int], int]] | None:

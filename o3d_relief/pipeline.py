@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from o3d_relief.attenuation_step import attenuation_step
 from o3d_relief.bounded_step import bounded_step
+from o3d_relief.bounds.ahead import Ahead
 from o3d_relief.bounds.lines import Lines
 from o3d_relief.bounds.near_points import NearPoints
 from o3d_relief.errors import MeshError, ParameterError
@@ -41,6 +42,7 @@ from o3d_relief.steps import (
     visibility_step,
     visible_depth,
 )
+from o3d_relief.threads import one_beside
 
 __all__ = ["make_relief"]
 
@@ -122,20 +124,31 @@ def make_relief(
     faces = scene.faces
     journal.begin("perspective")
     vertices = journal.keep(perspective_step(scene.vertices, view)).vertices
-    journal.begin("visibility")
-    # Who keeps the order casts more rays through the scene.
-    box = UnitBox(vertices, faces) if params.in_order and not params.bounded else None
-    visible = journal.keep(visibility_step(vertices, faces, view, box)).visible
-    settled = params.settled(visible_depth(vertices, visible) * scene.unit)
-    journal.begin("bounded" if params.bounded else "clusters")
-    laplacian, slivers = cotangent_laplacian(vertices, faces)
-    if params.bounded:
-        z = journal.keep(bounded_step(vertices, faces, visible, scene, settled, tick=journal.tick)).z
-    else:
-        z = _attenuated(
-            vertices, visible, laplacian, slivers, scene, Lines(vertices, faces, box), settled, journal
-        )
-    del box  # it takes much of the memory, and no more rays are cast through it
+    keeps_order = params.in_order and not params.bounded
+    with one_beside() as thread:
+        ahead = Ahead(thread, vertices, faces) if keeps_order else None
+        journal.begin("visibility")
+        # Who keeps the order casts more rays through the scene.
+        box = UnitBox(vertices, faces) if keeps_order else None
+        visible = journal.keep(visibility_step(vertices, faces, view, box)).visible
+        settled = params.settled(visible_depth(vertices, visible) * scene.unit)
+        journal.begin("bounded" if params.bounded else "clusters")
+        laplacian, slivers = cotangent_laplacian(vertices, faces)
+        if params.bounded:
+            z = journal.keep(bounded_step(vertices, faces, visible, scene, settled, tick=journal.tick)).z
+        else:
+            z = _attenuated(
+                vertices,
+                visible,
+                laplacian,
+                slivers,
+                scene,
+                Lines(vertices, faces, box),
+                ahead,
+                settled,
+                journal,
+            )
+    del box, ahead  # they take much of the memory, and no more rays are cast
 
     journal.begin("trim")
     out_faces, turned = turned_to_viewer(in_faces, scene, vertices, visible, laplacian)
@@ -175,6 +188,7 @@ def _attenuated(
     slivers: int,
     scene: SceneStage,
     lines: Lines,
+    ahead: Ahead | None,
     params: ReliefParams,
     journal: Journal,
 ) -> NDArray[np.float64]:
@@ -185,6 +199,8 @@ def _attenuated(
     points = journal.keep(attenuation_step(vertices, visible, scene, clusters, params))
     journal.begin("construction")
     pairs = stacked_pairs(lines, params)
+    if ahead is not None and pairs is not None:
+        ahead.stack(lines, pairs, laplacian, fine=params.min_gap > 0.0)
     z = journal.keep(
         construction_step(
             vertices, faces, visible, laplacian, slivers, clusters, points, pairs, tick=journal.tick
@@ -203,8 +219,7 @@ def _attenuated(
         laplacian,
         restored,
         around,
-        lines,
-        pairs,
+        ahead,
         params,
         scene.unit,
         tick=journal.tick,

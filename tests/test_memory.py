@@ -4,7 +4,7 @@ import threading
 import pytest
 
 from o3d_relief import memory
-from o3d_relief.memory import memory_kept
+from o3d_relief.memory import give_back, memory_kept
 
 
 @pytest.fixture
@@ -49,6 +49,12 @@ def test_the_last_thread_decides(calls):
     thread.join(10)
     assert not early
     assert calls[-1] == "trim"
+
+
+def test_some_is_given_back_in_between(calls):
+    with memory_kept():
+        give_back()
+        assert calls == [*memory._KEEPING, "trim"]
 
 
 def test_an_error_gives_it_back(calls):

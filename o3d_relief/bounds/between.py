@@ -32,8 +32,13 @@ class Between:
         self._edges = edges_of(faces) if edges is None else edges
         self._raster = Raster(vertices, faces)
         self._corners, self._ends = np.ascontiguousarray(faces.T), np.ascontiguousarray(self._edges.T)
-        self._last = np.full(len(vertices), np.nan)
         self._parted = Parted(vertices, faces, laplacian, self._raster)
+        self.forget()
+
+    def forget(self) -> None:
+        """Look everywhere the next time, not only where something has moved."""
+        self._last = np.full(len(self._vertices), np.nan)
+        self._parted.forget()
 
     def look_at(self, z: NDArray[np.float64]) -> tuple[Pairs, int]:
         """Return pairs that keep apart what was found, and how much it was, where something has moved."""

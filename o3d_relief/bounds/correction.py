@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
@@ -11,6 +13,7 @@ from scipy.spatial import cKDTree
 from o3d_relief.bounds.pairs import Pairs
 from o3d_relief.errors import SolverError
 from o3d_relief.linalg.quadratic import minimise
+from o3d_relief.threads import each
 
 __all__ = ["Correction"]
 
@@ -118,8 +121,9 @@ class Correction:
         waiting = new.copy()
         while True:
             failed = np.zeros(len(waiting), dtype=bool)
-            for free in self._regions(reach, columns, waiting):
-                correction = self._minimum(free, reach[free], rows, columns, least)
+            regions = self._regions(reach, columns, waiting)
+            minimum = partial(self._minimum, reach=reach, rows=rows, columns=columns, least=least)
+            for free, correction in zip(regions, each(minimum, regions), strict=True):
                 if correction is None:
                     failed[free] = True
                 else:
@@ -163,7 +167,7 @@ class Correction:
         # What was held to a rounding error may leave no room for more, if what lies around stays as it is.
         least = np.where(now > least - _HELD, np.minimum(least, now), least)
         return minimise(
-            form[:, free] + sp.diags_array(self._areas[free] / reach**2),
+            form[:, free] + sp.diags_array(self._areas[free] / reach[free] ** 2),
             -(form @ others),
             within[own],
             least - concerned @ others,

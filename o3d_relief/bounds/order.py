@@ -59,7 +59,7 @@ def keep_order(
     z: NDArray[np.float64],
     pairs: Pairs,
     *,
-    edges: NDArray[np.int64] | None = None,
+    between: Between | None = None,
     in_front: NDArray[np.bool_] | None = None,
     min_gap: float = 0.0,
     tick: Tick = silent,
@@ -84,8 +84,8 @@ def keep_order(
     z : (n,) float64
         Heights to correct.
     pairs : Pairs
-    edges : (e, 2) int64, optional
-        Those of the mesh, where they are at hand already.
+    between : Between, optional
+        Of the mesh, where it is at hand already.
     in_front : (n,) bool, optional
         Vertices that must not end behind S.
     min_gap : float
@@ -105,7 +105,9 @@ def keep_order(
     """
     front = np.zeros(len(z), dtype=bool) if in_front is None else in_front
     system = Correction(vertices, laplacian, areas, z)
-    lines, between = _Lines(pairs, len(z), min_gap), Between(vertices, faces, laplacian, edges)
+    lines = _Lines(pairs, len(z), min_gap)
+    between = Between(vertices, faces, laplacian) if between is None else between
+    between.forget()
     further, floor = Pairs.join([]), np.zeros(len(z), dtype=bool)
     current, best, fewest, rounds, first = z, z, np.inf, 0, 0
     while True:

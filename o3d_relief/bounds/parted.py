@@ -44,17 +44,18 @@ class Parted:
         raster: Raster,
     ) -> None:
         self._vertices, self._faces = vertices, faces
-        self._laplacian, self._raster = laplacian, raster
-        self._old: Crossings | None = None
-        self._last = np.full(len(vertices), np.nan)
+        self._old = self._between_parts(laplacian, raster)
+        self.forget()
+
+    def forget(self) -> None:
+        """Look everywhere the next time."""
+        self._last = np.full(len(self._vertices), np.nan)
 
     def look_at(self, z: NDArray[np.float64]) -> Pairs:
         """Return what lies right beside crossings that are gone for the heights z (n,).
 
         Upper and lower as they were in the scene; only where something has moved since the last call.
         """
-        if self._old is None:
-            self._old = self._between_parts()
         if len(self._old) == 0:
             return Pairs.join([])
         moved = z != self._last
@@ -73,13 +74,13 @@ class Parted:
         apart = ~near.pierced(before) & (np.abs(near.gaps(before)).max(axis=1) > _APART)
         return near.select(apart).pairs(before, z)
 
-    def _between_parts(self) -> Crossings:
+    def _between_parts(self, laplacian: sp.csr_array, raster: Raster) -> Crossings:
         """Find the edges that pierce triangles in the scene, near all parts but the largest."""
         vertices, faces = self._vertices, self._faces
-        count, label = connected_components(self._laplacian, directed=False)
+        count, label = connected_components(laplacian, directed=False)
         if count == 1:
             return crossings(vertices, faces[:0], edges_of(faces[:0]))
         smaller = (label != np.bincount(label).argmax())[faces[:, 0]]
-        near = faces[self._raster.over_or_under(smaller)]
+        near = faces[raster.over_or_under(smaller)]
         found = crossings(vertices, near, edges_of(near))
         return found.select(found.pierced(vertices[:, 2]))

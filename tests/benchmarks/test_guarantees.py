@@ -46,6 +46,8 @@ def test_a_row_for_each_mesh_and_setting(folder, monkeypatch, capsys):
         assert row["certificate"]["visible_behind"] == 0
         assert row["depth"] < row["scene_depth"]
         assert row["rest_seconds"] > 0.0
+        assert row["rest_wall_seconds"] > 0.0
+        assert row["guarantee_wall_seconds"] > -row["rest_wall_seconds"]
         assert line.endswith("| clean |") == (row["failures"] == [])
 
 

@@ -33,3 +33,5 @@ def test_nothing_is_found_in_the_scene_itself_nor_again_where_nothing_moved():
     sunk = vertices[:, 2] + np.where(np.arange(len(vertices)) == len(vertices) - 41, -12.0, 5.0)
     assert between.look_at(sunk)[1] > 0
     assert between.look_at(sunk)[1] == 0
+    between.forget()
+    assert between.look_at(sunk)[1] > 0
