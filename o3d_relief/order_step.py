@@ -16,7 +16,7 @@ from o3d_relief.steps import on_plane, ratios
 
 __all__ = ["order_step"]
 
-_STIFFER = (10.0, 100.0)
+_STIFFER = (10.0, 100.0, 1e4)
 """How much stiffer still the surface is at the points than in the restoration: corrections go elsewhere."""
 
 
