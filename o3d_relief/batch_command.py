@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Collection
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from o3d_relief.batch_manifest import MANIFEST
@@ -55,7 +55,7 @@ def batch(options: argparse.Namespace) -> int:
             scheduler=options.scheduler,
             max_triangles=options.max_triangles,
             strict=options.strict,
-            on_done=lambda entry: bar.write(tell, _line(entry, vars(options))),
+            on_done=lambda entry: bar.write(tell, _line(entry, options)),
             on_progress=bar,
         )
     finally:
@@ -72,11 +72,13 @@ def batch(options: argparse.Namespace) -> int:
     return 3 if failed else 0
 
 
-def _line(entry: BatchEntry, names: Collection[str]) -> str:
-    """Return what is said of an input, notes included; `names` are the options of the command."""
+def _line(entry: BatchEntry, options: argparse.Namespace) -> str:
+    """Return what is said of an input, notes included."""
     if not entry.made:
-        error = as_options(str(entry.error), names)
-        return f"failed: {error}" if entry.input in error else f"failed: {entry.input}: {error}"
+        output = str(options.out.resolve() / entry.output)
+        folder = str(Path(entry.input).parent)
+        error = as_options(str(entry.error), vars(options), (entry.input, folder, output, entry.output))
+        return f"failed: {error}" if entry.input in str(entry.error) else f"failed: {entry.input}: {error}"
     told = f"{entry.triangles} triangles, {entry.depth:.4g} deep, {entry.seconds:.1f} s"
     if entry.certificate is not None:
         told += f"; certificate: {'fails' if entry.failures else 'clean'}"

@@ -8,6 +8,7 @@ import signal
 import sys
 import time
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NoReturn
 
 from o3d_relief.arguments import parse
@@ -52,7 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         commands = {"make": make, "batch": batch, "demo": _demo, "view": view, "edit": edit}
         return commands[options.command](options)
     except ReliefError as error:
-        tell(f"o3d-relief: error: {as_options(str(error), vars(options))}")
+        tell(f"o3d-relief: error: {as_options(str(error), vars(options), _places(options))}")
         return 2
     except MemoryError:
         tell("o3d-relief: error: the memory is used up: reduce the mesh, or use a machine with more memory.")
@@ -66,6 +67,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _places(options: argparse.Namespace) -> list[str]:
+    """Return the names of files and folders that were given, but for those that may be parameters, too."""
+    values = [
+        one
+        for value in vars(options).values()
+        for one in (value if isinstance(value, list) else [value])
+        if isinstance(one, Path)
+    ]
+    return [str(path) for path in values if not str(path).isidentifier()]
 
 
 def run() -> NoReturn:

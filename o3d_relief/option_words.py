@@ -7,12 +7,14 @@ from collections.abc import Collection
 
 __all__ = ["as_options"]
 
-_FIRST = re.compile(r"(\w+)(?: and (\w+))?\b")
+_FIRST = re.compile(r"(\w+)(?: and (\w+))?\b(?!\.[A-Za-z])")
 _VALUE = re.compile(r"""\b(\w+)=(True|False|'[\w-]+'|"[\w-]+")""")
-_LONG = re.compile(r"(?<![\w./-])(?<!'s )[a-z]+(?:_[a-z]+)+(?![\w./-])")
+_LONG = re.compile(r"(?<![\w./\\\0-])(?<!'s )[a-z]+(?:_[a-z]+)+(?![\w./\\\0-])")
+_KEPT = "\0"
+"""Stands for a name that is kept: no sentence and no file's name has it."""
 
 
-def as_options(sentence: str, names: Collection[str]) -> str:
+def as_options(sentence: str, names: Collection[str], kept: Collection[str] = ()) -> str:
     """Spell the parameters that a sentence names as options.
 
     Names of several words are found everywhere, those of one word, which may be plain English, where the
@@ -23,6 +25,8 @@ def as_options(sentence: str, names: Collection[str]) -> str:
     sentence : str
     names : collection of str
         The parameters that have options of the same name.
+    kept : collection of str
+        Names of files and folders, which stay as they are.
 
     Returns
     -------
@@ -34,7 +38,14 @@ def as_options(sentence: str, names: Collection[str]) -> str:
     '--base-mm must be less than --depth-mm, 4.'
     >>> as_options('in_order=False needs mode="attenuation".', ["in_order", "mode"])
     '--no-in-order needs --mode attenuation.'
+    >>> as_options("/my base_mm scans/a.ply: base_mm is 0.", ["base_mm"], ["/my base_mm scans/a.ply"])
+    '/my base_mm scans/a.ply: --base-mm is 0.'
     """
+    found: list[str] = []
+
+    def put_away(match: re.Match[str]) -> str:
+        found.append(match[0])
+        return _KEPT
 
     def option(name: str) -> str:
         if name not in names:
@@ -49,9 +60,13 @@ def as_options(sentence: str, names: Collection[str]) -> str:
             return option(name) if value == "True" else f"--no-{option(name)[2:]}"
         return f"{option(name)} {value}"
 
-    result = _VALUE.sub(with_value, sentence)
+    # Of names within each other the longest is taken.
+    words = [re.escape(name) for name in sorted(kept, key=len, reverse=True) if name]
+    result = re.sub(rf"(?<!\w)(?:{'|'.join(words)})(?!\w)", put_away, sentence) if words else sentence
+    result = _VALUE.sub(with_value, result)
     first = _FIRST.match(result)
     if first is not None and first[1] in names:
-        words = [option(word) for word in first.groups() if word is not None]
-        result = " and ".join(words) + result[first.end() :]
-    return _LONG.sub(lambda match: option(match[0]), result)
+        result = " and ".join(option(word) for word in first.groups() if word) + result[first.end() :]
+    result = _LONG.sub(lambda match: option(match[0]), result)
+    names_of_files = iter(found)
+    return re.sub(_KEPT, lambda _: next(names_of_files), result)

@@ -48,6 +48,23 @@ def test_errors_name_options_as_they_are_typed(monkeypatch, capsys):
     assert "failed: /a/y.ply: -k must be at most 9: 3 triangles (--max-triangles)." in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("source", "output", "error", "said"),
+    [
+        ("/a/depth.ply", "depth.ply", "depth.ply is not written.", "/a/depth.ply: depth.ply is not written."),
+        ("/a/depth 1.ply", "depth 1.ply", "depth 1.ply is no.", "/a/depth 1.ply: depth 1.ply is no."),
+        ("C:\\min_gap\\x.ply", "x.ply", "C:\\min_gap\\x.ply is empty.", "C:\\min_gap\\x.ply is empty."),
+        ("/my min_gap s/x.ply", "x.ply", "/my min_gap s/x.ply is empty.", "/my min_gap s/x.ply is empty."),
+        ("/my min_gap s/x.ply", "x.ply", "min_gap of x.ply", "/my min_gap s/x.ply: --min-gap of x.ply"),
+        ("/x.ply", "x.ply", "/x.ply: alpha_min, in/min_gap.ply", "/x.ply: --alpha-min, in/min_gap.ply"),
+    ],
+)
+def test_names_of_files_are_no_options(monkeypatch, capsys, source, output, error, said):
+    entry = dataclasses.replace(FAILED, input=source, output=output, error=error)
+    assert _run(monkeypatch, [entry])[0] == 2
+    assert f"failed: {said}\n" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(("failures", "said"), [([], "clean\n"), (["Bent."], "fails\n  Bent.\n  No uvs.\n")])
 def test_certificates_are_told(monkeypatch, capsys, failures, said):
     entry = dataclasses.replace(MADE, certificate={"failures": failures})

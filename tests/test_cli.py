@@ -284,6 +284,13 @@ def test_a_mesh_error_names_the_file(tmp_path, scene, capsys):
     assert "flat.ply: The scene is seen edge-on" in _fails(capsys, "make", flat, tmp_path / "r.ply", *words)
 
 
+def test_names_of_files_are_no_options(tmp_path, capsys):
+    folder = tmp_path / "my min_gap scans"
+    folder.mkdir()
+    (folder / "x.ply").write_bytes(b"Dear sculptor")
+    assert "my min_gap scans" in _fails(capsys, "make", folder / "x.ply", tmp_path / "r.ply")
+
+
 def test_strict_refuses_what_the_certificate_finds(tmp_path, scene, capsys):
     out = tmp_path / "r.ply"
     sentence = _fails(capsys, "make", scene, out, "-k", "64", "--no-in-front", "--strict")
