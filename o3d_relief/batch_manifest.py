@@ -38,7 +38,7 @@ class BatchEntry:
     triangles : int or None
         Of the relief.
     certificate : dict or None
-        What was measured on the relief, as in `Relief.report`; None where there was none to measure.
+        What was measured on the relief, as in `Relief.report`; None where nothing was measured.
     error : str or None
         A sentence that says why there is no relief.
     notes : tuple of str
@@ -87,9 +87,12 @@ class BatchEntry:
         """Read a line of a manifest; ValueError where it is none."""
         values = json.loads(line)
         try:
-            return cls(**(values | {"notes": tuple(values["notes"])}))
+            entry = cls(**(values | {"notes": tuple(values["notes"])}))
         except (TypeError, KeyError) as error:
             raise ValueError(f"not a line of a batch ({error})") from error
+        if entry.certificate is not None and not _is_certificate(entry.certificate):
+            raise ValueError(f"not a line of a batch (its certificate is {entry.certificate!r})")
+        return entry
 
     def holds(self, folder: Path, recipe: str) -> bool:
         """Tell whether the relief is there, whole, and what input and recipe would give again.
@@ -111,6 +114,11 @@ class BatchEntry:
         except OSError:
             return False  # something is missing
         return picture.is_file() and sha256(written).hexdigest() == self.output_sha256
+
+
+def _is_certificate(value: object) -> bool:
+    failures = value.get("failures") if isinstance(value, dict) else None
+    return isinstance(failures, list) and all(isinstance(sentence, str) for sentence in failures)
 
 
 class Notes:

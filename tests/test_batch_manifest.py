@@ -43,6 +43,16 @@ def test_other_lines_are_refused(line):
         BatchEntry.from_line(line)
 
 
+@pytest.mark.parametrize("certificate", [{}, 5, [], {"failures": None}, {"failures": "x"}, {"failures": [1]}])
+def test_other_certificates_are_refused(tmp_path, made, certificate):
+    line = dataclasses.replace(made, certificate=certificate).line()
+    with pytest.raises(ValueError, match="not a line of a batch"):
+        BatchEntry.from_line(line)
+    (tmp_path / "manifest.jsonl").write_text(line)
+    with pytest.raises(FileError, match=r"manifest\.jsonl .*line 1"):
+        Manifest(tmp_path)
+
+
 def test_what_still_holds(tmp_path, made):
     assert made.holds(tmp_path, "abc")
     assert not made.holds(tmp_path, "abd")
