@@ -10,7 +10,7 @@ from pathlib import Path
 from o3d_relief.batch_engine import Engine, open_engine
 from o3d_relief.batch_inputs import find_inputs, output_names
 from o3d_relief.batch_manifest import PICTURES, BatchEntry, Manifest, Notes
-from o3d_relief.batch_sheet import write_sheets
+from o3d_relief.batch_sheet import remove_sheets, write_sheets
 from o3d_relief.batch_task import MOST_ATTEMPTS, BatchTask, Recipe, lost_entry
 from o3d_relief.errors import FileError, ParameterError, ReliefError
 from o3d_relief.files import clear_leftovers
@@ -59,6 +59,7 @@ def make_reliefs(
     engine: str = "loky",
     scheduler: str | None = None,
     max_triangles: int | None = None,
+    certificates: bool = False,
     strict: bool = False,
     on_done: OnDone | None = None,
     on_progress: OnProgress | None = None,
@@ -92,8 +93,12 @@ def make_reliefs(
         Address of the cluster; where omitted, Dask and Ray start one on this machine.
     max_triangles : int, optional
         Larger meshes are refused; 10,000,000 where omitted.
+    certificates : bool
+        Make a certificate of each relief, for the manifest; it takes time and memory of its own. Reliefs of
+        an earlier run that have none are made again, those that have one are not.
     strict : bool
-        A relief whose certificate is not clean is not written, and its input counts as failed.
+        Make certificates; a relief whose certificate is not clean is not written, one of an earlier run is
+        removed with its picture, and the input counts as failed.
     on_done : callable, optional
         Called with the entry of each input as soon as it is done; not for those that were done already.
     on_progress : callable, optional
@@ -124,6 +129,7 @@ def make_reliefs(
         ending=_checked_ending(ending),
         max_triangles=max_triangles,
         strict=strict,
+        certificates=certificates,
     )
     sources = find_inputs(inputs)
     folder = _made_folder(Path(out))
@@ -141,6 +147,8 @@ def make_reliefs(
             ):
                 for count, entry in enumerate(entries, start=done + 1):
                     manifest.add(entry)
+                    if strict and not entry.made:
+                        remove_sheets(folder)  # they may show what was refused
                     if on_done is not None:
                         on_done(entry)
                     progress.tick(count / len(sources))
@@ -182,8 +190,9 @@ def _open_tasks(sources: list[str], folder: Path, manifest: Manifest, recipe: Re
     for source in sources:
         entry = manifest.entries.get(source)
         kept = entry is not None and entry.output == names[source] and entry.holds(folder, digest)
-        refused = recipe.strict and entry is not None and (entry.certificate is None or entry.failures)
-        if not kept or refused:
+        lacking = recipe.certified and entry is not None and entry.certificate is None
+        refused = recipe.strict and entry is not None and entry.failures
+        if not kept or lacking or refused:
             tasks.append(
                 BatchTask(
                     input=source, output=names[source], folder=str(folder), recipe=recipe, digest=digest

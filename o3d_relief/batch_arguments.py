@@ -30,7 +30,9 @@ def add_batch(command: argparse.ArgumentParser) -> None:
         help="processes on this machine, or a cluster (default: %(default)s)")  # fmt: skip
     add("--scheduler", metavar="ADDRESS",
         help="of the Dask or Ray cluster (default: one on this machine)")  # fmt: skip
+    add("--certificates", action="store_true",
+        help="test what each relief keeps, which takes time and memory, and note it")  # fmt: skip
     add("--strict", action="store_true",
-        help="refuse reliefs that do not keep what the certificate tests, and go on")  # fmt: skip
+        help="refuse reliefs that do not keep what --certificates tests, and go on")  # fmt: skip
     add("--max-triangles", type=int, metavar="N",
         help=f"refuse larger meshes (default: {MAX_TRIANGLES})")  # fmt: skip

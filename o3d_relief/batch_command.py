@@ -54,6 +54,7 @@ def batch(options: argparse.Namespace) -> int:
             engine=options.engine,
             scheduler=options.scheduler,
             max_triangles=options.max_triangles,
+            certificates=options.certificates,
             strict=options.strict,
             on_done=lambda entry: bar.write(tell, _line(entry, options)),
             on_progress=bar,

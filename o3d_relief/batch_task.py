@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from o3d_relief import __version__
 from o3d_relief.batch_manifest import PICTURES, BatchEntry, Notes
-from o3d_relief.errors import ReliefError
+from o3d_relief.errors import ParameterError, ReliefError
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.scan_params import ScanParams
 
@@ -25,6 +25,9 @@ MOST_ATTEMPTS = 2
 """An input that has cost so many workers their lives is given up."""
 
 _PICTURE = (320, 320)
+
+_WITHOUT_EFFECT = ("strict", "certificates")
+"""They do not change what a relief is."""
 
 _ALONE = threading.Lock()
 """Workers of several threads make one relief at a time: the threads of the linear algebra are set for a whole
@@ -46,6 +49,13 @@ class Recipe:
     max_triangles : int or None
     strict : bool
         Whether a relief whose certificate is not clean is refused.
+    certificates : bool
+        Whether a certificate is made of each relief; always where `strict` is.
+
+    Raises
+    ------
+    ParameterError
+        `strict` or `certificates` is not a bool.
     """
 
     params: ReliefParams
@@ -54,10 +64,21 @@ class Recipe:
     ending: str
     max_triangles: int | None
     strict: bool = False
+    certificates: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("strict", "certificates"):
+            if not isinstance(getattr(self, name), bool):
+                raise ParameterError(f"{name} must be True or False. Got {getattr(self, name)!r} instead.")
+
+    @property
+    def certified(self) -> bool:
+        """Whether certificates are made."""
+        return self.strict or self.certificates
 
     def digest(self) -> str:
         """Return the SHA-256 of what makes a relief the one it is, and of the package's version."""
-        values = {name: value for name, value in asdict(self).items() if name != "strict"}
+        values = {name: value for name, value in asdict(self).items() if name not in _WITHOUT_EFFECT}
         text = json.dumps([__version__, values], sort_keys=True)
         return sha256(text.encode()).hexdigest()
 
@@ -169,7 +190,7 @@ def _sentence(error: Exception) -> str:
 
 
 def _make(task: BatchTask, notes: Notes, started: float, known: dict[str, Any]) -> BatchEntry:
-    from o3d_relief.files import write_files
+    from o3d_relief.files import remove_files, write_files
     from o3d_relief.pipeline import make_relief
     from o3d_relief.scene.write import lost_attributes, mesh_files
     from o3d_relief.show.render import render, save_png
@@ -180,22 +201,26 @@ def _make(task: BatchTask, notes: Notes, started: float, known: dict[str, Any]) 
         scene, recipe.params, view=recipe.view, scan=scan, max_triangles=recipe.max_triangles
     )
     output = folder / task.output
+    picture_file = folder / PICTURES / f"{output.stem}.png"
     known |= {
         "depth": float(relief.mesh.get_max_bound()[2]),
         "triangles": len(relief.mesh.triangles),
-        "certificate": json.loads(json.dumps(relief.report()["certificate"])),  # as it is read again
         "notes": (*left_out, *(lost_attributes(task.output, scene) if scan is None else ())),
     }
-    failures = relief.certificate.failures
-    if recipe.strict and failures:
-        refused = f"{task.output} is not written (strict): {failures[0]}"
+    del scene  # a certificate takes memory of its own
+    if recipe.certified:
+        known["certificate"] = json.loads(json.dumps(relief.report()["certificate"]))  # as it is read again
+    files = mesh_files(output, relief.mesh)
+    if recipe.strict and relief.certificate.failures:
+        remove_files(output, files)  # what an earlier run has left
+        remove_files(picture_file, ())
+        refused = f"{task.output} is not written (strict=True): {' '.join(relief.certificate.failures)}"
         entry = task.entry(status="failed", error=refused, seconds=_since(started), **known)
         notes.keep(entry)
         return entry
-    files = mesh_files(output, relief.mesh)
     title = f"{output.stem}, {known['depth']:.4g} deep"
     picture = render(relief.mesh, size=_PICTURE, plate=True, title=title)
-    save_png(folder / PICTURES / f"{output.stem}.png", picture)
+    save_png(picture_file, picture)
     checksum = sha256(files[output.name]).hexdigest()
     entry = task.entry(status="made", seconds=_since(started), output_sha256=checksum, **known)
     # The note comes first: killed in between, its checksum does not fit what is there, and all is done again.

@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 import secrets
 import shutil
+from collections.abc import Iterable
 from pathlib import Path
 
 from o3d_relief.errors import FileError
 
-__all__ = ["check_exists", "check_place", "clear_leftovers", "write_bytes", "write_files"]
+__all__ = ["check_exists", "check_place", "clear_leftovers", "remove_files", "write_bytes", "write_files"]
 
 
 _WORK = ".o3d-relief-"
@@ -83,6 +84,29 @@ def clear_leftovers(folder: str | Path) -> None:
     """
     for path in Path(folder).glob(_WORK + 8 * "?"):
         shutil.rmtree(path, ignore_errors=True)
+
+
+def remove_files(path: str | Path, names: Iterable[str]) -> None:
+    """Take a file and those that belong to it away; those that are not there do not matter.
+
+    Parameters
+    ----------
+    path : str or Path
+        The main file, which goes first.
+    names : iterable of str
+        Of the others, in its folder.
+
+    Raises
+    ------
+    FileError
+        A file cannot be removed.
+    """
+    path = Path(path)
+    for one in (path, *(path.parent / name for name in names)):
+        try:
+            one.unlink(missing_ok=True)
+        except OSError as error:
+            raise FileError(f"{one} cannot be removed: {error.strerror}. Remove it yourself.") from error
 
 
 def write_bytes(path: str | Path, content: bytes) -> None:

@@ -272,16 +272,54 @@ def test_strict_makes_again_only_what_it_refuses(tmp_path):
     o3d.io.write_triangle_mesh(str(inputs[1]), to_mesh(bust(30)))
     params = rel.ReliefParams(k=48, in_front=False)  # which leaves some of the bust behind the plane
 
-    def run(*, strict):
-        return rel.make_reliefs(inputs, out, params, jobs=1, strict=strict)
+    def run(**options):
+        return rel.make_reliefs(inputs, out, params, jobs=1, **options)
 
-    assert [entry.certificate["visible_behind"] > 0 for entry in run(strict=False).entries] == [False, True]
+    assert [entry.certificate for entry in run().entries] == [None, None]
+    batch = run(certificates=True)
+    assert batch.already_done == 0
+    assert [entry.certificate["visible_behind"] > 0 for entry in batch.entries] == [False, True]
+    assert run(certificates=True).already_done == run().already_done == 2
+    assert (out / "ball_01.ply").exists()
+    sheet, before = (out / "contact_sheet.png").read_bytes(), stamps(out)
     batch = run(strict=True)
     assert batch.already_done == 1
     assert [entry.made for entry in batch.entries] == [True, False]
     assert "visible vertices lie behind the plane" in batch.failed[0].error
     assert lines(out)[1]["certificate"]["visible_behind"] > 0
-    assert run(strict=False).failed == ()
+    # What is refused is not there, nor is it to be seen.
+    assert stamps(out) == {"ball_00.ply": before["ball_00.ply"]}
+    assert [path.name for path in (out / "pictures").iterdir()] == ["ball_00.png"]
+    assert (out / "contact_sheet.png").read_bytes() != sheet
+    assert run().failed == ()
+    assert (out / "contact_sheet.png").read_bytes() == sheet
+
+
+def test_no_sheet_shows_what_is_refused(tmp_path):
+    """Where it is all, and where the batch is called off."""
+    inputs, out = write_balls(tmp_path / "in", 2), tmp_path / "out"
+    for path in inputs:
+        o3d.io.write_triangle_mesh(str(path), to_mesh(bust(30)))
+    params = rel.ReliefParams(k=48, in_front=False)
+    rel.make_reliefs(inputs, out, params, jobs=1)
+    sheet = out / "contact_sheet.png"
+    assert sheet.exists()
+    with pytest.raises(rel.Cancelled):
+        rel.make_reliefs(
+            inputs, out, params, jobs=1, strict=True, on_progress=lambda _, share: (share or 0) < 0.3
+        )
+    assert not sheet.exists()
+    sheet.touch()
+    assert len(rel.make_reliefs(inputs, out, params, jobs=1, strict=True).failed) == 2
+    assert not sheet.exists()
+
+
+@pytest.mark.parametrize("name", ["strict", "certificates"])
+def test_switches_are_checked(tmp_path, name):
+    inputs, out = write_balls(tmp_path / "in", 1), tmp_path / "out"
+    with pytest.raises(rel.ParameterError, match=f"{name} must be True or False"):
+        rel.make_reliefs(inputs, out, **{name: 1})
+    assert not out.exists()
 
 
 def test_called_off(tmp_path):

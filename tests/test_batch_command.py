@@ -56,6 +56,7 @@ def test_errors_name_options_as_they_are_typed(monkeypatch, capsys):
         ("C:\\min_gap\\x.ply", "x.ply", "C:\\min_gap\\x.ply is empty.", "C:\\min_gap\\x.ply is empty."),
         ("/my min_gap s/x.ply", "x.ply", "/my min_gap s/x.ply is empty.", "/my min_gap s/x.ply is empty."),
         ("/my min_gap s/x.ply", "x.ply", "min_gap of x.ply", "/my min_gap s/x.ply: --min-gap of x.ply"),
+        ("/x.ply", "x.ply", "x.ply is no (strict=True): A. B.", "/x.ply: x.ply is no (--strict): A. B."),
         ("/x.ply", "x.ply", "/x.ply: alpha_min, in/min_gap.ply", "/x.ply: --alpha-min, in/min_gap.ply"),
     ],
 )
@@ -90,9 +91,10 @@ def test_every_option_arrives(tmp_path, monkeypatch):
     assert asked["params"] == rel.ReliefParams(k=7, alpha=0.75)
     assert asked["view"] == rel.View(front="-y", up="z")
     assert asked["scan"].max_hole == 2.0
-    names = ("jobs", "engine", "scheduler", "ending", "max_triangles", "strict")
-    assert [asked[name] for name in names] == [3, "dask", "tcp://h:1", ".glb", 99, True]
+    names = ("jobs", "engine", "scheduler", "ending", "max_triangles", "strict", "certificates")
+    assert [asked[name] for name in names] == [3, "dask", "tcp://h:1", ".glb", 99, True, False]
     assert _run(monkeypatch, [MADE])[1]["strict"] is False
+    assert _run(monkeypatch, [MADE], "--certificates")[1]["certificates"] is True
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@ import numpy as np
 from PIL import Image
 
 from o3d_relief.batch_manifest import BatchEntry
-from o3d_relief.batch_sheet import write_sheets
+from o3d_relief.batch_sheet import remove_sheets, write_sheets
 
 
 def _entries(folder, count):
@@ -36,3 +36,17 @@ def test_many_reliefs_have_several_sheets(tmp_path):
 
 def test_no_relief_has_no_sheet(tmp_path):
     assert write_sheets(tmp_path, []) == []
+
+
+def test_old_sheets_are_removed(tmp_path):
+    entries = _entries(tmp_path, 103)
+    write_sheets(tmp_path, entries)
+    (tmp_path / "contact_sheet_of_mine.png").touch()
+    assert write_sheets(tmp_path, entries[:2]) == [tmp_path / "contact_sheet.png"]
+    assert sorted(path.name for path in tmp_path.glob("*.png")) == [
+        "contact_sheet.png",
+        "contact_sheet_of_mine.png",
+    ]
+    write_sheets(tmp_path, entries)
+    remove_sheets(tmp_path)
+    assert [path.name for path in tmp_path.glob("*.png")] == ["contact_sheet_of_mine.png"]

@@ -1,6 +1,7 @@
 import dataclasses
 import json
 from hashlib import sha256
+from pathlib import Path
 
 import numpy as np
 import open3d as o3d
@@ -9,6 +10,7 @@ import pytest
 import o3d_relief as rel
 from o3d_relief.batch_manifest import Notes
 from o3d_relief.batch_task import BatchTask, Recipe, run_task
+from o3d_relief.bounds.certificate import Certificate
 from shapes import bust, hills, sphere, to_mesh
 
 RECIPE = Recipe(
@@ -37,7 +39,7 @@ def test_a_relief_its_picture_and_its_entry(tmp_path, task):
     assert entry.depth == np.asarray(expected.mesh.vertices)[:, 2].max()
     assert entry.triangles == len(expected.mesh.triangles)
     written = (tmp_path / "relief.ply").read_bytes()
-    assert entry.certificate == json.loads(json.dumps(expected.report()["certificate"]))
+    assert entry.certificate is None
     assert entry.output_sha256 == sha256(written).hexdigest()
     rel.write_mesh(tmp_path / "alone.ply", expected.mesh)
     assert written == (tmp_path / "alone.ply").read_bytes()
@@ -45,6 +47,23 @@ def test_a_relief_its_picture_and_its_entry(tmp_path, task):
     assert Notes(tmp_path).entry(task.input) == entry
     assert Notes(tmp_path).attempts(task.input) == 0
     assert run_task(task) == entry  # the first one counts, seconds and all
+
+
+def test_a_certificate_where_it_is_asked_for(task, monkeypatch):
+    entry = run_task(dataclasses.replace(task, recipe=dataclasses.replace(RECIPE, certificates=True)))
+    expected = rel.make_relief(rel.read_mesh(task.input), RECIPE.params)
+    assert entry.made
+    assert entry.certificate == json.loads(json.dumps(expected.report()["certificate"]))
+
+    def certify(**_arrays):
+        raise AssertionError("A certificate is made.")
+
+    monkeypatch.setattr("o3d_relief.relief.certify", certify)
+    Notes(Path(task.folder)).remove()
+    assert run_task(task).made
+    Notes(Path(task.folder)).remove()
+    strict = dataclasses.replace(task, recipe=dataclasses.replace(RECIPE, strict=True))
+    assert "A certificate is made" in run_task(strict).error
 
 
 def test_a_point_cloud_is_meshed(tmp_path, task):
@@ -81,17 +100,53 @@ def test_strict_refuses_what_the_certificate_finds(tmp_path, task):
     loose = dataclasses.replace(RECIPE, params=params)
     entry = run_task(dataclasses.replace(task, recipe=dataclasses.replace(loose, strict=True)))
     assert entry.status == "failed"
-    assert entry.error == f"relief.ply is not written (strict): {entry.failures[0]}"
+    assert entry.error == f"relief.ply is not written (strict=True): {entry.failures[0]}"
     assert "visible vertices lie behind the plane" in entry.failures[0]
     assert not (tmp_path / "relief.ply").exists()
     assert Notes(tmp_path).entry(task.input) == entry
-    made = run_task(dataclasses.replace(task, recipe=loose))
+    noted = dataclasses.replace(loose, certificates=True)
+    made = run_task(dataclasses.replace(task, recipe=noted))
     assert made.made
     assert made.certificate == entry.certificate  # refused or not, the same was measured
 
 
-def test_strict_makes_the_same_reliefs():
-    assert dataclasses.replace(RECIPE, strict=True).digest() == RECIPE.digest()
+def test_everything_that_fails_is_told(task, monkeypatch):
+    monkeypatch.setattr(Certificate, "failures", ["They are bent.", "They cross."])
+    entry = run_task(dataclasses.replace(task, recipe=dataclasses.replace(RECIPE, strict=True)))
+    assert entry.error == "relief.ply is not written (strict=True): They are bent. They cross."
+    assert entry.failures == ("They are bent.", "They cross.")
+
+
+def test_what_strict_refuses_is_removed_with_all_its_files(tmp_path, task):
+    mesh = to_mesh(bust(30))
+    mesh.triangle_uvs = o3d.utility.Vector2dVector(np.zeros((3 * len(mesh.triangles), 2)))
+    mesh.triangle_material_ids = o3d.utility.IntVector([0] * len(mesh.triangles))
+    mesh.textures = [o3d.geometry.Image(np.full((2, 2, 3), 99, np.uint8))]
+    source = tmp_path / "in" / "bust.obj"
+    source.parent.mkdir()
+    rel.write_mesh(source, mesh)
+    folder = tmp_path / "out"
+    (folder / "pictures").mkdir(parents=True)
+    recipe = dataclasses.replace(RECIPE, params=rel.ReliefParams(k=64, in_front=False), ending=".obj")
+    task = dataclasses.replace(
+        task, input=str(source), output="r.obj", folder=str(folder), recipe=recipe, digest=recipe.digest()
+    )
+    assert run_task(task).made
+    Notes(folder).remove()
+    files = {path.name for path in folder.rglob("*") if path.is_file()}
+    assert files == {"r.obj", "r.mtl", "r_0.png", "r.png"}
+    (folder / "other.ply").touch()
+    refused = run_task(dataclasses.replace(task, recipe=dataclasses.replace(recipe, strict=True)))
+    assert "r.obj is not written" in refused.error
+    Notes(folder).remove()
+    assert [path.name for path in folder.rglob("*") if path.is_file()] == ["other.ply"]
+
+
+@pytest.mark.parametrize("name", ["strict", "certificates"])
+def test_the_same_reliefs_with_or_without(name):
+    assert dataclasses.replace(RECIPE, **{name: True}).digest() == RECIPE.digest()
+    with pytest.raises(rel.ParameterError, match=f"{name} must be True or False. Got 'no' instead"):
+        dataclasses.replace(RECIPE, **{name: "no"})
 
 
 def test_a_file_that_has_cost_two_workers_is_not_begun_again(tmp_path, task):

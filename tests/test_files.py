@@ -13,7 +13,7 @@ import pytest
 from o3d_relief import files as files_module
 from o3d_relief.cli import main
 from o3d_relief.errors import FileError
-from o3d_relief.files import check_exists, check_place, write_bytes, write_files
+from o3d_relief.files import check_exists, check_place, remove_files, write_bytes, write_files
 from shapes import bust, to_mesh
 
 POSIX = pytest.mark.skipif(os.name != "posix", reason="signals and limits of POSIX")
@@ -218,3 +218,13 @@ def test_no_memory_is_one_sentence(scene, tmp_path, monkeypatch, capsys):
     assert main(["make", str(scene), str(tmp_path / "r.ply")]) == 2
     assert capsys.readouterr().err.splitlines()[-1].startswith("o3d-relief: error: the memory is used up")
     assert names(tmp_path) == ["scene.ply"]
+
+
+def test_files_are_removed(tmp_path):
+    for name in ("a.obj", "a.mtl", "other.mtl"):
+        (tmp_path / name).touch()
+    remove_files(tmp_path / "a.obj", ["a.mtl", "a_0.png", "a.obj"])
+    assert [path.name for path in tmp_path.iterdir()] == ["other.mtl"]
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(FileError, match="folder cannot be removed: "):
+        remove_files(tmp_path / "folder", [])
