@@ -10,6 +10,8 @@ import pytest
 from PIL import Image
 
 from o3d_relief.errors import FileError, ParameterError
+from o3d_relief.params import ReliefParams
+from o3d_relief.pipeline import make_relief
 from o3d_relief.records import (
     AttenuationStage,
     BoundedStage,
@@ -23,8 +25,6 @@ from o3d_relief.records import (
     TrimStage,
     VisibilityStage,
 )
-from o3d_relief.params import ReliefParams
-from o3d_relief.pipeline import make_relief
 from o3d_relief.show import stage_panels
 from o3d_relief.show.render import render
 from o3d_relief.show.sheets import contact_sheet, save_stage_pictures, stage_picture, view_sheet
