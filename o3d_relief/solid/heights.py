@@ -133,7 +133,8 @@ def height_field(solid: Solid, mm_per_pixel: float) -> HeightField:
     [2.0, 1.0]
     """
     low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
-    columns, rows = check_pixels(*(high - low)[:2], mm_per_pixel)
+    width, height, _ = high - low
+    columns, rows = check_pixels(width, height, mm_per_pixel)
     middle = (low + high) / 2
     left, top = middle[0] - columns * mm_per_pixel / 2, middle[1] + rows * mm_per_pixel / 2
     x = left + (np.arange(columns) + 0.5) * mm_per_pixel
