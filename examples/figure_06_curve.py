@@ -6,15 +6,11 @@ upwards. Of a mesh, the slice at half its height is drawn. Needs matplotlib.
 
 import sys
 
-import matplotlib as mpl
-
-mpl.use("Agg")
-
-import matplotlib.pyplot as plt
 import numpy as np
 import open3d as o3d
 
 import o3d_relief as rel
+from o3d_relief.files import check_place
 
 ACTIONS = {"attach": "tab:blue", "scale": "tab:orange", "discard": "tab:red"}
 
@@ -36,6 +32,14 @@ def folded_strip(steps: int = 301) -> o3d.geometry.TriangleMesh:
 
 
 def main(scene: str | None = None, output: str = "figure_06.png", *, panel: int = 460) -> None:
+    check_place(output)
+    try:
+        import matplotlib as mpl
+    except ImportError:
+        raise rel.ReliefError("This figure needs matplotlib: pip install matplotlib.") from None
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt
+
     mesh = rel.read_mesh(scene) if scene else folded_strip()
     k = 64 if scene else 14
     relief = rel.make_relief(mesh, rel.ReliefParams.paper(k=k))

@@ -6,17 +6,21 @@ matplotlib.
 
 import sys
 
-import matplotlib as mpl
-
-mpl.use("Agg")
-
-import matplotlib.pyplot as plt
 import numpy as np
 
 import o3d_relief as rel
+from o3d_relief.files import check_place
 
 
 def main(scene: str | None = None, output: str = "figure_07.png", *, panel: int = 460) -> None:
+    check_place(output)
+    try:
+        import matplotlib as mpl
+    except ImportError:
+        raise rel.ReliefError("This figure needs matplotlib: pip install matplotlib.") from None
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt
+
     mesh = rel.read_mesh(scene) if scene else rel.demo_scene()
     points = rel.make_relief(mesh, rel.ReliefParams.paper(k=128)).stages["attenuation"]
     scaled = np.abs(points.differential[points.action == "scale"])

@@ -131,8 +131,10 @@ def _add_make(commands: Any, replaced: dict[str, Any]) -> None:
         "print checks; end with 3 where these only warn",
     )  # fmt: skip
     make.add_argument(
-        "--dry-run", action="store_true", help="only tell sizes, volume, triangles and memory in advance"
-    )
+        "--dry-run", action="store_true",
+        help="only tell sizes, volume, triangles and memory in advance; refuses the parameters and meshes "
+        "that the run would refuse before its long work",
+    )  # fmt: skip
     _add_limit(make)
     make.set_defaults(**replaced)
 

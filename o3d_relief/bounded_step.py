@@ -113,8 +113,8 @@ def bounded_step(
 
 def check_bounded(
     vertices: NDArray[np.float64], visible: NDArray[np.bool_], scene: SceneStage, params: ReliefParams
-) -> None:
-    """Refuse what `bounded_step` would refuse, without its long work."""
+) -> float:
+    """Refuse what `bounded_step` would refuse, without its long work; return the height of what becomes S."""
     z, faces = vertices[:, 2], scene.faces
     _kept_shape(scene, params)
     _attached(scene, params)
@@ -122,6 +122,7 @@ def check_bounded(
     depth = cast(float, params.depth) / scene.unit
     if float(z.max()) - lowest > depth * (1.0 + _ROUNDING):
         _check_depth(depth, scene.unit)
+    return lowest
 
 
 def _seen_rows(

@@ -73,10 +73,12 @@ def make(options: argparse.Namespace) -> int:
             scanned = scan_points(scene, meshing, view=view, on_stage=tell_stage, on_progress=bar)
             scene, meshing = scanned.mesh, None
         if plate is not None and plate.depth_mm is not None:
-            params = replace(params, depth=relief_depth(scene, view, plate))
+            depth = relief_depth(scene, view, plate, max_triangles=options.max_triangles)
+            params = replace(params, depth=depth)
         if options.dry_run:
-            check_scene(scene, params, view, options.max_triangles)
-            tell_estimate(scene, params, view, plate, tell, field=options.undercut_free)
+            most, free = options.max_triangles, options.undercut_free
+            check_scene(scene, params, view, most, solid=plate is not None)
+            tell_estimate(scene, params, view, plate, tell, mill=mill, undercut_free=free, max_triangles=most)
             return 0
         relief = make_relief(
             scene if scanned is None else scanned,

@@ -18,6 +18,7 @@ from o3d_relief.relief import Relief
 from o3d_relief.solid.body import Solid
 from o3d_relief.solid.checks import SolidReport, check_solid
 from o3d_relief.solid.estimate import estimate_relief, estimate_solid
+from o3d_relief.solid.heights import check_pixels
 from o3d_relief.solid.make import make_solid
 from o3d_relief.solid.measures import wall_thickness
 from o3d_relief.workshop import Work, work_on
@@ -101,7 +102,9 @@ def tell_estimate(
     plate: PlateParams | None,
     tell: Tell,
     *,
-    field: bool = False,
+    mill: MillParams | None = None,
+    undercut_free: bool = False,
+    max_triangles: int | None = None,
 ) -> None:
     """Tell what a solid, or a relief alone, will measure.
 
@@ -114,21 +117,42 @@ def tell_estimate(
         None where only a relief is wanted, which has no volume and is told in the unit of the file.
     tell : callable
         Takes a line.
-    field : bool
-        Whether it becomes a height field, whose triangles are as many as its pixels are small.
+    mill : MillParams, optional
+        Of the height field that is taken of the solid.
+    undercut_free : bool
+        Whether the solid becomes that height field, whose triangles are as many as its pixels are small.
+    max_triangles : int, optional
+        As in `make_relief`.
+
+    Raises
+    ------
+    MeshError
+        A mesh from which no relief, or no solid, can be made.
+    ParameterError
+        More pixels than a height field may have.
     """
     if plate is None:
-        found, precision, unit = estimate_relief(mesh, params, view), ".4g", "in the unit of the file"
+        found, precision, unit = (
+            estimate_relief(mesh, params, view, max_triangles=max_triangles),
+            ".4g",
+            "in the unit of the file",
+        )
         unit += ": a surface, no solid (--width-mm)"
     else:
-        found, precision, unit = estimate_solid(mesh, params, view, plate), ".2f", "mm"
+        found, precision, unit = (
+            estimate_solid(mesh, params, view, plate, max_triangles=max_triangles),
+            ".2f",
+            "mm",
+        )
+        if mill is not None:
+            check_pixels(*found.size[:2], mill.mm_per_pixel, about=True)
     x, y, z = (format(side, precision) for side in found.size)
     tell(f"seen      {found.visible_depth:.4g} deep, in the unit of the file; --depth 100% is all of it")
     tell(f"size      {x} x {y} x {'' if found.depth_known else 'at most '}{z} {unit}")
     if found.volume_mm3 is not None:
         tell(f"volume    {'about' if found.depth_known else 'at most'} {found.volume_mm3 / 1000.0:.0f} cm3")
     finer = ", more where textures become colours" if mesh.has_textures() else ""
-    finer += ", more in a height field" if field else ""
+    finer += ", more in a height field" if undercut_free else ""
     tell(f"triangles about {found.triangles}{finer}")
     tell(f"memory    about {found.memory_mb / 1000.0:.1f} GB")
 

@@ -79,8 +79,8 @@ def load_params(path: str | Path) -> tuple[ReliefParams, View]:
         raise FileError(f"{path} is not a parameter file in JSON: {why}; {_WANTED}.") from error
     if isinstance(values, dict) and {"params", "view", "stages"} <= values.keys():
         raise FileError(
-            f"{path} is the report of a relief, not a parameter file: take everything but its "
-            '"params" and "view" out of a copy of it.'
+            f'{path} is the report of a relief, not a parameter file: keep only its "params" and "view", '
+            "in a copy of it."
         )
     try:
         _check_keys("the file", values, ("o3d_relief", "params", "view"))
@@ -121,12 +121,12 @@ def _object(name: str, values: object, kind: type[_Kind]) -> dict[str, Any]:
 
 
 def _check_keys(name: str, values: object, known: list[str] | tuple[str, ...]) -> dict[str, Any]:
+    wanted = f"; {_WANTED}" if name == "the file" else ""
     if not isinstance(values, dict):
         short = reprlib.repr(values)
-        raise ParameterError(f"{name} must be an object with names and values. Got {short} instead.")
+        raise ParameterError(f"{name} must be an object with names and values. Got {short} instead{wanted}.")
     for key in values:
         if key not in known:
-            wanted = f"; {_WANTED}" if name == "the file" else ""
             raise ParameterError(f"{key!r} is not known in {name}: choose among {', '.join(known)}{wanted}.")
     return values
 

@@ -227,7 +227,8 @@ class OrderStage(StageRecord):
     Attributes
     ----------
     z : (n,) float64
-        Equal to that of the restoration where the order is not kept (``in_order=False``).
+        Equal to that of the restoration where the order is not kept (``in_order=False``); then there are
+        no counts.
     """
 
     name: ClassVar[str] = "order"

@@ -531,6 +531,33 @@ def test_dry_run_refuses_a_flat_solid(tmp_path, capsys):
     assert _fails(capsys, *command, "--dry-run") == refused
 
 
+def test_dry_run_refuses_a_solid_of_what_is_flat_where_it_is_seen(tmp_path, capsys):
+    write_mesh(tmp_path / "box.obj", o3d.geometry.TriangleMesh.create_box(10, 10, 3))
+    command = ["make", tmp_path / "box.obj", tmp_path / "s.stl", "--width-mm", "100", "--depth-mm", "20"]
+    refused = _fails(capsys, *command)
+    assert "it cannot become a solid" in refused
+    assert _fails(capsys, *command, "--dry-run").splitlines()[-1] == refused.splitlines()[-1]
+
+
+@pytest.mark.parametrize("option", ["--undercut-free", "--height-map"])
+def test_dry_run_refuses_too_many_pixels(tmp_path, scene, capsys, option):
+    words = ["--width-mm", "2000", "--base-mm", "50", "--mm-per-pixel", "0.01", option]
+    words += [tmp_path / "h.png"] if option == "--height-map" else []
+    told = _fails(capsys, "make", scene, tmp_path / "s.stl", "--dry-run", *words)
+    assert "--mm-per-pixel must be larger: 0.01 makes about 200000 x " in told
+    assert "size " not in told
+
+
+def test_more_triangles_than_usual_where_they_are_asked_for(tmp_path, scene, capsys, monkeypatch):
+    monkeypatch.setattr("o3d_relief.limits.MAX_TRIANGLES", 100)
+    most = ["--max-triangles", "100000"]
+    command = ["make", str(scene), str(tmp_path / "s.stl"), *most, "--width-mm", "90", "--depth-mm", "15"]
+    assert main([*command, "--dry-run"]) == 0
+    assert main([*command[:3], *most, "--dry-run"]) == 0
+    assert main(command) == 0
+    assert "more than the 100 that are accepted" in _fails(capsys, *command[:3], *command[5:])
+
+
 def test_dry_run_of_a_relief_tells_the_unit_of_the_file(tmp_path, scene, capsys):
     assert main(["make", str(scene), str(tmp_path / "r.ply"), "--dry-run", "--depth", "9"]) == 0
     told = capsys.readouterr().err

@@ -60,6 +60,24 @@ def test_figures(tmp_path, scene, capsys, name):
     assert capsys.readouterr().out
 
 
+@pytest.mark.parametrize("name", ["figure_06_curve", "figure_07_attenuation"])
+def test_what_curves_need_is_looked_at_before_the_work(tmp_path, capsys, monkeypatch, name):
+    monkeypatch.setattr("o3d_relief.make_relief", None)
+    start = _load("start").start
+    monkeypatch.setitem(sys.modules, "matplotlib", None)  # as if it were not installed
+    example = _load(name)
+    start(example.main, example.__doc__, ["--help"])
+    assert "Needs matplotlib" in " ".join(capsys.readouterr().out.split())
+    for output, sentence in (
+        (tmp_path / "figure.png", "needs matplotlib: pip install matplotlib"),
+        (tmp_path / "nowhere" / "figure.png", "is missing: make it first"),
+    ):
+        with pytest.raises(SystemExit) as ended:
+            start(example.main, example.__doc__, ["scene.ply", str(output)])
+        assert ended.value.code == 2
+        assert sentence in capsys.readouterr().err
+
+
 def test_gallery_scenes_are_sound():
     gallery = _load("figure_13_gallery")
     knot = gallery.coil(steps=120, around=8)

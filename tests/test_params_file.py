@@ -102,13 +102,15 @@ def test_a_report_is_named_and_what_to_take_of_it(tmp_path):
     params = ReliefParams(k=3, point_edits=[PointEdit(vertex=0, action="attach")])
     report = make_relief(to_mesh(bust(8)), params, view=View(front="x")).report()
     path.write_text(json.dumps(report))
-    with pytest.raises(FileError, match="is the report of a relief, not a parameter file: take everything"):
+    with pytest.raises(FileError, match="is the report of a relief, not a parameter file: keep only its"):
         load_params(path)
     path.write_text(json.dumps({name: report[name] for name in ("params", "view")}))
     assert load_params(path) == (params, View(front="x"))
 
 
-@pytest.mark.parametrize("text", ['{"asset": {}, "meshes": []}', '{"k": 64}', "solid x", '{"input": 1}\n{}'])
+@pytest.mark.parametrize(
+    "text", ['[{"k": 3}]', '{"asset": {}, "meshes": []}', '{"k": 64}', "solid x", '{"input": 1}\n{}']
+)
 def test_what_is_wanted_is_said(tmp_path, text):
     path = tmp_path / "other.json"
     path.write_text(text)

@@ -31,7 +31,8 @@ class Inversions:
     worst : float
         How far the worst of those that changed places stood the other way round, in relief units.
     gaps_tested, gaps_missed : int
-        Pairs that were at least the asked gap apart in the scene, and those that are not in the relief.
+        Pairs that were at least the asked gap apart in the scene, and those that are not in the relief;
+        surfaces that only touch in the picture miss none.
     places : tuple of Place
         Some of those that changed places, that did so but crossed in the scene, and of the missed gaps.
     """
@@ -75,14 +76,7 @@ def inversions(
     upper, lower = pairs.heights(before)
     gap = upper - lower
     turned = np.flatnonzero(gap < -_SAME)
-    there = pairs.select(turned)
-    places = [
-        _met(vertices, corners, weights)
-        for corners, weights in (
-            (there.upper, there.upper_weights),
-            (there.lower, there.lower_weights),
-        )
-    ]
+    places = _places(vertices, pairs.select(turned))
     # Where the one ends in the picture and the other begins, rays meet both by a rounding error.
     stacked = origin.covers(*places)
     turned, places = turned[stacked], [place[stacked] for place in places]
@@ -90,6 +84,7 @@ def inversions(
     inverted = turned[~crossed]
     wide = gap >= max(min_gap, _SAME)
     missed = np.flatnonzero(wide & (pairs.gap < min_gap - _SAME) & (min_gap > 0.0))
+    missed = missed[origin.covers(*_places(vertices, pairs.select(missed)))]
     known = pairs.select(few(turned[crossed]))
     told = pair_places("inversion", vertices, pairs.select(few(inverted)), origin)
     told += pair_places("old inversion", vertices, known, origin, crossed=True)
@@ -105,6 +100,14 @@ def inversions(
         gaps_missed=len(missed),
         places=told,
     )
+
+
+def _places(vertices: NDArray[np.float64], pairs: Pairs) -> list[NDArray[np.int64]]:
+    """Return the upper and the lower places of pairs as `_met` writes them."""
+    return [
+        _met(vertices, corners, weights)
+        for corners, weights in ((pairs.upper, pairs.upper_weights), (pairs.lower, pairs.lower_weights))
+    ]
 
 
 def _met(

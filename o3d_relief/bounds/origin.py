@@ -66,7 +66,7 @@ class Origin:
         Returns
         -------
         (q,) bool
-            False where they touch at most: no line along z passes through both.
+            False where they touch at most, or overlap by no more than 2e-5 relief units.
         """
         row, a, b = self._combined(one, other)
         found = triangles_overlap(self._corners[a, :, :2], self._corners[b, :, :2])
@@ -163,11 +163,13 @@ def triangles_overlap(one: NDArray[np.float64], other: NDArray[np.float64]) -> N
     Parameters
     ----------
     one, other : (q, 3, 2) float64
-        Corners, in relief units; triangles without an area overlap nothing.
+        Corners, in relief units.
 
     Returns
     -------
     (q,) bool
+        False up to an overlap of 2e-5 relief units. Three different corners on one line overlap what that
+        line passes through, which is on the safe side; two corners in one place overlap nothing.
 
     Examples
     --------

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o3d_relief.errors import ParameterError
+from o3d_relief.scene.convert import check_mesh
 from o3d_relief.show.camera import fit_scale, view_direction
 from o3d_relief.show.render import plate_bounds, render
 from o3d_relief.show.sheets import contact_sheet
@@ -35,8 +36,8 @@ def comparison_sheet(
     Parameters
     ----------
     meshes : mapping of str to open3d.geometry.TriangleMesh
-        By their titles; in the relief frame and in one unit: where one is ten times as large as another, it
-        is taken for one in another unit. Each lies in the middle of its panels.
+        By their titles; in the relief frame and in one unit. One that is ten times as large as another is
+        refused: it may be in another unit. Each lies in the middle of its panels.
     yaws : sequence of float
         Degrees to the right of the front.
     plates : collection of str
@@ -51,16 +52,16 @@ def comparison_sheet(
     Raises
     ------
     ParameterError
-        No mesh, no view, a plate for a mesh that is not there, or meshes in different units.
+        No mesh, no view, a plate for a mesh that is not there, or one mesh ten times as large as another.
     MeshError
-        A mesh without a triangle to draw.
+        Something else than a mesh, or one without a triangle to draw.
     """
     if not meshes or not yaws:
         raise ParameterError("A comparison needs a mesh and a view.")
     unknown = sorted(set(plates) - set(meshes))
     if unknown:
         raise ParameterError(f"plates must be among {', '.join(meshes)}. Got {unknown[0]!r} instead.")
-    boxes = {name: np.array([mesh.get_min_bound(), mesh.get_max_bound()]) for name, mesh in meshes.items()}
+    boxes = {name: _box(name, mesh) for name, mesh in meshes.items()}
     _check_unit(boxes)
     views = [view_direction(yaw) for yaw in yaws]
     framed = [_with_plate(box) if name in plates else box for name, box in boxes.items()]
@@ -80,6 +81,16 @@ def comparison_sheet(
     return contact_sheet(pictures, len(meshes), titles=titles, row_labels=labels)
 
 
+def _box(name: str, mesh: o3d.geometry.TriangleMesh) -> NDArray[np.float64]:
+    """Return the least and the greatest corner (2, 3) of what the faces of a mesh use."""
+    check_mesh(f"The mesh {name!r}", mesh)
+    vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.triangles)
+    used = vertices[faces[(faces >= 0) & (faces < len(vertices))]]
+    if len(used) == 0:
+        return np.zeros((2, 3))  # nothing to draw, which is said later
+    return np.array([used.min(axis=0), used.max(axis=0)])
+
+
 def _check_unit(boxes: Mapping[str, NDArray[np.float64]]) -> None:
     """Refuse meshes whose larger sides (x or y) are as different as two units."""
     sides = {name: float(np.ptp(box, axis=0)[:2].max()) for name, box in boxes.items()}
@@ -89,7 +100,7 @@ def _check_unit(boxes: Mapping[str, NDArray[np.float64]]) -> None:
     if sides[small] * _ANOTHER_UNIT <= sides[large] * (1.0 + 1e-6):
         raise ParameterError(
             f"A comparison is drawn at one scale, but {large!r} is {sides[large]:.4g} large and {small!r} "
-            f"{sides[small]:.4g}: bring the meshes into one unit."
+            f"{sides[small]:.4g}: give meshes in one unit, and less than ten times as large as each other."
         )
 
 

@@ -202,11 +202,12 @@ def save_png(path: str | Path, image: NDArray[np.uint8]) -> None:
     FileError
         The folder is missing or cannot be written to.
     ParameterError
-        Something else than a picture.
+        Something else than a picture, or one without a pixel.
     """
-    if not isinstance(image, np.ndarray) or image.dtype != np.uint8 or image.shape[2:] != (3,):
+    picture = isinstance(image, np.ndarray) and image.dtype == np.uint8 and image.shape[2:] == (3,)
+    if not picture or image.size == 0:
         found = f"{image.shape} {image.dtype}" if isinstance(image, np.ndarray) else repr(type(image))
-        raise ParameterError(f"image must be (height, width, 3) uint8. Got {found} instead.")
+        raise ParameterError(f"image must be (height, width, 3) uint8, not empty. Got {found} instead.")
     content = BytesIO()
     Image.fromarray(image).save(content, format="PNG")
     write_bytes(path, content.getvalue())

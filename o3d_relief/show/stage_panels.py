@@ -220,7 +220,11 @@ def _order(easel: Easel) -> Pictures:
     moved = record.z - restored
     largest = float(np.abs(moved).max())
     if largest <= _STILL:
-        titles = ("before", "in order: nothing had to be moved")
+        asked = bool(record.counts)  # of an order that was looked at
+        titles = (
+            "before",
+            "in order: nothing had to be moved" if asked else "order not asked for: unchanged",
+        )
         return _pair(easel, (before, before), titles, direction=_FRONT, plate=True)
     bounds = _bounds(before, after)
     count = record.counts.get("pairs_corrected", 0)

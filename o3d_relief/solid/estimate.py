@@ -58,7 +58,12 @@ class Estimate:
 
 
 def estimate_solid(
-    mesh: o3d.geometry.TriangleMesh, params: ReliefParams, view: View, plate: PlateParams
+    mesh: o3d.geometry.TriangleMesh,
+    params: ReliefParams,
+    view: View,
+    plate: PlateParams,
+    *,
+    max_triangles: int | None = None,
 ) -> Estimate:
     """Estimate the solid's measures from the scene alone.
 
@@ -68,6 +73,8 @@ def estimate_solid(
     params : ReliefParams
     view : View
     plate : PlateParams
+    max_triangles : int, optional
+        As in `make_relief`.
 
     Returns
     -------
@@ -78,7 +85,7 @@ def estimate_solid(
     MeshError
         A mesh from which no relief, or no solid, can be made.
     """
-    vertices, faces, unit = _seen(mesh, view)
+    vertices, faces, unit = _seen(mesh, view, max_triangles)
     used = vertices[np.unique(faces)]
     check_extents(used)
     scale = scale_for(used[:, :2], plate)
@@ -102,7 +109,9 @@ def estimate_solid(
     )
 
 
-def estimate_relief(mesh: o3d.geometry.TriangleMesh, params: ReliefParams, view: View) -> Estimate:
+def estimate_relief(
+    mesh: o3d.geometry.TriangleMesh, params: ReliefParams, view: View, *, max_triangles: int | None = None
+) -> Estimate:
     """Estimate the measures of a relief without a plate from the scene alone.
 
     Parameters
@@ -110,6 +119,8 @@ def estimate_relief(mesh: o3d.geometry.TriangleMesh, params: ReliefParams, view:
     mesh : open3d.geometry.TriangleMesh
     params : ReliefParams
     view : View
+    max_triangles : int, optional
+        As in `make_relief`.
 
     Returns
     -------
@@ -120,7 +131,7 @@ def estimate_relief(mesh: o3d.geometry.TriangleMesh, params: ReliefParams, view:
     MeshError
         A mesh from which no relief can be made.
     """
-    vertices, faces, unit = _seen(mesh, view)
+    vertices, faces, unit = _seen(mesh, view, max_triangles)
     width, height, scene_depth = np.ptp(vertices[np.unique(faces)], axis=0) * unit
     seen_depth = visible_depth(vertices, visibility_step(vertices, faces, view).visible) * unit
     depth, known = _depth(params, seen_depth, scene_depth, 1.0)
@@ -147,7 +158,9 @@ def _memory_mb(faces: NDArray[np.int64]) -> float:
     return _MEGABYTES + _BYTES_PER_TRIANGLE * len(faces) / 1e6
 
 
-def relief_depth(mesh: o3d.geometry.TriangleMesh, view: View, plate: PlateParams) -> float | None:
+def relief_depth(
+    mesh: o3d.geometry.TriangleMesh, view: View, plate: PlateParams, *, max_triangles: int | None = None
+) -> float | None:
     """Return the depth of the relief, in the input's unit, that gives the solid's depth in millimetres.
 
     Parameters
@@ -155,6 +168,8 @@ def relief_depth(mesh: o3d.geometry.TriangleMesh, view: View, plate: PlateParams
     mesh : open3d.geometry.TriangleMesh
     view : View
     plate : PlateParams
+    max_triangles : int, optional
+        As in `make_relief`.
 
     Returns
     -------
@@ -168,16 +183,16 @@ def relief_depth(mesh: o3d.geometry.TriangleMesh, view: View, plate: PlateParams
     """
     if plate.depth_mm is None:
         return None
-    vertices, faces, unit = _seen(mesh, view)
+    vertices, faces, unit = _seen(mesh, view, max_triangles)
     scale = scale_for(vertices[np.unique(faces), :2], plate)
     return (plate.depth_mm - plate.back_mm) / scale * unit
 
 
 def _seen(
-    mesh: o3d.geometry.TriangleMesh, view: View
+    mesh: o3d.geometry.TriangleMesh, view: View, max_triangles: int | None
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], float]:
     """Return the scene as the relief takes it: vertices in relief units, faces, and the unit."""
-    vertices, faces = mesh_arrays(mesh)
+    vertices, faces = mesh_arrays(mesh, max_triangles)
     frame = frame_step(vertices, faces, view)
     placed = perspective_step(to_relief_units(vertices, frame, on_grid=True), view).vertices
     return placed, faces, frame.unit

@@ -14,7 +14,7 @@ from o3d_relief.rays import unit_box
 from o3d_relief.solid.body import PLATE_COLOR, Solid
 from o3d_relief.solid.plate import as_plate
 
-__all__ = ["HeightField", "height_field", "solid_under"]
+__all__ = ["HeightField", "check_pixels", "height_field", "solid_under"]
 
 _MOST_PIXELS = 40_000_000
 """Of a height field: about 8 GB of memory."""
@@ -76,6 +76,31 @@ class HeightField:
         return replace(self, z=np.where(np.isfinite(z), z, np.nan))
 
 
+def check_pixels(width: float, height: float, mm_per_pixel: float, *, about: bool = False) -> tuple[int, int]:
+    """Return the columns and rows of the height field of a piece, and refuse more than 40 million pixels.
+
+    Parameters
+    ----------
+    width, height : float
+        Of the piece, in millimetres.
+    mm_per_pixel : float
+    about : bool
+        Whether the size is an estimate, which the sentence then says.
+
+    Raises
+    ------
+    ParameterError
+        Too many pixels.
+    """
+    columns, rows = (max(1, int(np.ceil(side / mm_per_pixel - 1e-9))) for side in (width, height))
+    if rows * columns > _MOST_PIXELS:
+        raise ParameterError(
+            f"mm_per_pixel must be larger: {mm_per_pixel:g} makes {'about ' if about else ''}{columns} x "
+            f"{rows} pixels of this piece, more than {_MOST_PIXELS:,}."
+        )
+    return columns, rows
+
+
 def height_field(solid: Solid, mm_per_pixel: float) -> HeightField:
     """Look at a solid from the front: the first surface that a ray along -z meets.
 
@@ -108,12 +133,8 @@ def height_field(solid: Solid, mm_per_pixel: float) -> HeightField:
     [2.0, 1.0]
     """
     low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
-    columns, rows = (max(1, int(np.ceil((high[i] - low[i]) / mm_per_pixel - 1e-9))) for i in (0, 1))
-    if rows * columns > _MOST_PIXELS:
-        raise ParameterError(
-            f"mm_per_pixel must be larger: {mm_per_pixel:g} makes {columns} x {rows} pixels of this piece, "
-            f"more than {_MOST_PIXELS:,}."
-        )
+    width, height, _ = high - low
+    columns, rows = check_pixels(width, height, mm_per_pixel)
     middle = (low + high) / 2
     left, top = middle[0] - columns * mm_per_pixel / 2, middle[1] + rows * mm_per_pixel / 2
     x = left + (np.arange(columns) + 0.5) * mm_per_pixel

@@ -89,7 +89,7 @@ def make_solid(
     params = PlateParams() if params is None else params
     if not isinstance(params, PlateParams):
         raise ParameterError(f"params must be a PlateParams. Got {params!r} instead.")
-    if not hasattr(relief, "stages"):
+    if not isinstance(relief, Relief):
         kind = f"{type(relief).__module__}.{type(relief).__qualname__}"
         raise ParameterError(f"relief must be a Relief, as make_relief returns. Got a {kind} instead.")
     progress = Progress(on_progress)

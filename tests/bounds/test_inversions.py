@@ -62,3 +62,9 @@ def test_surfaces_that_only_touch_in_the_picture_are_in_no_order(overlap, invert
     found = inversions(relief, pairs, scene[:, 2], Origin(faces, faces, scene))
     assert found.inverted == inverted
     assert found.tested == 1
+    # Nor is a gap between them missed.
+    flat = scene * [1, 1, 0.1]
+    pairs = Pairs(upper=corner, upper_weights=weights, lower=side, lower_weights=share, gap=np.array([1.0]))
+    close = inversions(flat, pairs, scene[:, 2], Origin(faces, faces, scene), min_gap=2.0)
+    assert (close.gaps_tested, close.gaps_missed) == (1, inverted)
+    assert len(close.places) == inverted

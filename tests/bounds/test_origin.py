@@ -123,3 +123,21 @@ def test_triangles_of_the_picture_overlap_unless_a_side_parts_them():
         assert overlap == (best.x[6] > 0)
     assert 50 < found.sum() < 150
     assert np.array_equal(found, triangles_overlap(other, one[:, ::-1]))
+
+
+@pytest.mark.parametrize(
+    ("corners", "overlaps"),
+    [
+        pytest.param([[1, 1], [1.5, 1.5], [2, 2]], True, id="on a line in the inside"),
+        pytest.param([[5, 0], [5, 1], [5, 2]], False, id="on a line outside"),
+        pytest.param([[1, 0], [2, 0], [3, 0]], False, id="on a line along a side"),
+        pytest.param([[1, 1], [1, 1], [2, 2]], False, id="two corners in one place"),
+        pytest.param([[1, 1], [1, 1], [1, 1]], False, id="all in one place"),
+        pytest.param([[4 - 1e-5, 0], [9, 0], [9, 4]], False, id="by a rounding error"),
+        pytest.param([[4 - 1e-3, -1], [9, -1], [4 - 1e-3, 4]], True, id="by more than that"),
+    ],
+)
+def test_triangles_without_an_area_and_at_the_border(corners, overlaps):
+    big, small = _FLAT[None, :, :2], np.array([corners], dtype=float)
+    assert triangles_overlap(big, small).tolist() == [overlaps]
+    assert triangles_overlap(small, big).tolist() == [overlaps]

@@ -1,4 +1,5 @@
 import numpy as np
+import open3d as o3d
 import pytest
 
 from o3d_relief.errors import MeshError, ParameterError
@@ -45,13 +46,22 @@ def test_other_units_are_refused(meshes, factor):
         if factor < 1.0
         else "'other' is 1000 large and '(ball|sheet)' 100"
     )
-    with pytest.raises(ParameterError, match=f"{names}: bring the meshes into one unit"):
+    with pytest.raises(ParameterError, match=f"{names}: give meshes in one unit, and less than ten times"):
         comparison_sheet({**meshes, "other": other}, panel=(50, 50))
 
 
 def test_sizes_of_one_unit_are_not_refused(meshes):
     other = to_mesh(sphere(8)).scale(0.11, (0.0, 0.0, 0.0))
     assert comparison_sheet({**meshes, "other": other}, panel=(50, 50)).shape[1] == 166
+
+
+def test_vertices_that_no_face_uses_do_not_count(meshes):
+    places, faces = sphere(8)
+    stray = to_mesh((np.vstack([places, [[1e5, 0, 0]]]), faces))
+    assert np.array_equal(
+        comparison_sheet({"a": stray, "b": meshes["sheet"]}, panel=(50, 50)),
+        comparison_sheet({"a": meshes["ball"], "b": meshes["sheet"]}, panel=(50, 50)),
+    )
 
 
 def test_errors(meshes):
@@ -61,5 +71,8 @@ def test_errors(meshes):
         comparison_sheet(meshes, ())
     with pytest.raises(ParameterError, match=r"among ball, sheet\. Got 'cube' instead"):
         comparison_sheet(meshes, plates=["cube"])
+    tensors = o3d.t.geometry.TriangleMesh.from_legacy(meshes["ball"])
+    with pytest.raises(MeshError, match=r"The mesh 'cube' must be .* take what its to_legacy\(\) returns"):
+        comparison_sheet({**meshes, "cube": tensors})
     with pytest.raises(MeshError, match="no triangles"):
         comparison_sheet({**meshes, "nothing": type(meshes["ball"])()})

@@ -507,7 +507,8 @@ def test_save_png_leaves_nothing_behind_when_it_fails(tmp_path):
 def test_save_png_keeps_the_old_file_when_the_picture_is_bad(tmp_path):
     target = tmp_path / "picture.png"
     target.write_bytes(b"old")
-    for image in (np.zeros((2, 2, 7), dtype=np.uint8), np.zeros((2, 2, 3)), [[0]]):
+    empty = [np.zeros(shape, dtype=np.uint8) for shape in ((0, 4, 3), (4, 0, 3))]
+    for image in (np.zeros((2, 2, 7), dtype=np.uint8), np.zeros((2, 2, 3)), [[0]], *empty):
         with pytest.raises(ParameterError, match=r"image must be \(height, width, 3\) uint8"):
             save_png(target, image)
     assert [path.name for path in tmp_path.iterdir()] == ["picture.png"]

@@ -10,6 +10,8 @@ import pytest
 from PIL import Image
 
 from o3d_relief.errors import FileError, ParameterError
+from o3d_relief.params import ReliefParams
+from o3d_relief.pipeline import make_relief
 from o3d_relief.records import (
     AttenuationStage,
     BoundedStage,
@@ -307,6 +309,19 @@ def test_what_is_the_same_before_and_after_is_drawn_once(stages, drawn, name):
     assert not np.array_equal(image[:30, :200], image[:30, 208:])
     stage_picture(name, stages, size=SIZE)
     assert len(drawn) == 3
+
+
+def test_an_order_that_was_not_asked_for_is_not_said_to_be_kept(stages, monkeypatch):
+    titles = []
+    told = stage_panels.annotate
+    monkeypatch.setattr(stage_panels, "annotate", lambda *a, **o: titles.append(o["title"]) or told(*a, **o))
+    ball = o3d.geometry.TriangleMesh.create_sphere(50.0, 6)
+    for params, sentence in (
+        (ReliefParams.paper(k=4), "order not asked for: unchanged"),
+        (ReliefParams(k=4), "in order: nothing had to be moved"),
+    ):
+        stage_picture("order", make_relief(ball, params).stages, size=SIZE)
+        assert titles[-2:] == ["before", sentence]
 
 
 @pytest.mark.parametrize(

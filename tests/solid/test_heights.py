@@ -4,7 +4,7 @@ import trimesh
 
 from o3d_relief.errors import ParameterError
 from o3d_relief.solid.body import PLATE_COLOR, Solid
-from o3d_relief.solid.heights import HeightField, height_field, solid_under
+from o3d_relief.solid.heights import HeightField, check_pixels, height_field, solid_under
 from shapes import bust
 from slabs import ball_on_slab, plain, plate, slab
 
@@ -151,3 +151,14 @@ def _ring():
 
 def test_plain_helper_is_a_plate():
     assert plain(plate()).volume() == pytest.approx(9600.0)
+
+
+def test_pixels_of_a_piece():
+    assert check_pixels(30.0, 20.1, 0.1) == (300, 201)
+    assert check_pixels(0.0, 1.0, 2.0) == (1, 1)
+    with pytest.raises(
+        ParameterError, match="makes 200000 x 1000 pixels of this piece, more than 40,000,000"
+    ):
+        check_pixels(2000.0, 10.0, 0.01)
+    with pytest.raises(ParameterError, match="makes about 200000 x 1000 pixels"):
+        check_pixels(2000.0, 10.0, 0.01, about=True)

@@ -1,3 +1,5 @@
+from types import SimpleNamespace
+
 import manifold3d
 import numpy as np
 import pytest
@@ -272,6 +274,8 @@ def test_nothing_to_make_a_solid_of():
         solid_of(arrays([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]], [[0, 1, 2]]), PlateParams())
     with pytest.raises(ParameterError, match="must be a PlateParams"):
         rel.make_solid(None, 150)
+    with pytest.raises(ParameterError, match="must be a Relief, as make_relief returns"):
+        rel.make_solid(SimpleNamespace(mesh=to_mesh(bust(8)), stages={}))
 
 
 def test_a_relief_becomes_a_solid():
