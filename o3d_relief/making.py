@@ -132,18 +132,11 @@ def tell_estimate(
         More pixels than a height field may have.
     """
     if plate is None:
-        found, precision, unit = (
-            estimate_relief(mesh, params, view, max_triangles=max_triangles),
-            ".4g",
-            "in the unit of the file",
-        )
-        unit += ": a surface, no solid (--width-mm)"
+        found = estimate_relief(mesh, params, view, max_triangles=max_triangles)
+        precision, unit = ".4g", "in the unit of the file: a surface, no solid (--width-mm)"
     else:
-        found, precision, unit = (
-            estimate_solid(mesh, params, view, plate, max_triangles=max_triangles),
-            ".2f",
-            "mm",
-        )
+        found = estimate_solid(mesh, params, view, plate, max_triangles=max_triangles)
+        precision, unit = ".2f", "mm"
         if mill is not None:
             check_pixels(*found.size[:2], mill.mm_per_pixel, about=True)
     x, y, z = (format(side, precision) for side in found.size)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from o3d_relief.bounds.ahead import Ahead
 from o3d_relief.bounds.near_points import NearPoints
-from o3d_relief.bounds.order import Ordered, keep_order
+from o3d_relief.bounds.order import keep_order
 from o3d_relief.params import ReliefParams
 from o3d_relief.progress import Tick, silent
 from o3d_relief.records import OrderStage, RestorationStage
@@ -40,27 +42,24 @@ def order_step(
     # The compression comes later and shrinks gaps, at most by its smallest ratio.
     ratio, lowest = ratios(z, params, unit)
     min_gap = params.min_gap / unit / (0.95 * lowest if ratio < 1.0 else 1.0)
-    front = visible if params.in_front else None
-
-    def ordered_with(form: sp.csr_array) -> Ordered:
-        return keep_order(
-            vertices,
-            faces,
-            form,
-            ahead.areas,
-            z,
-            ahead.pairs,
-            between=ahead.between,
-            in_front=front,
-            min_gap=min_gap,
-            tick=tick,
-        )
-
+    ordered_with = partial(
+        keep_order,
+        vertices,
+        faces,
+        areas=ahead.areas,
+        z=z,
+        pairs=ahead.pairs,
+        between=ahead.between,
+        in_front=visible if params.in_front else None,
+        min_gap=min_gap,
+        tick=tick,
+    )
     if restored.stiffness == 0.0:
-        ordered = ordered_with(laplacian)
+        ordered = ordered_with(laplacian=laplacian)
     else:
         for stiffer in _STIFFER:
-            ordered = ordered_with(around.stiffness.added_to(laplacian, restored.stiffness * stiffer))
+            form = around.stiffness.added_to(laplacian, restored.stiffness * stiffer)
+            ordered = ordered_with(laplacian=form)
             near, elsewhere = around.bends.most(ordered.z)
             if ordered.rounds == 0 or near <= elsewhere:
                 break

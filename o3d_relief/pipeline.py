@@ -14,6 +14,7 @@ from o3d_relief.bounded_step import bounded_step
 from o3d_relief.bounds.ahead import Ahead
 from o3d_relief.bounds.lines import Lines
 from o3d_relief.bounds.near_points import NearPoints
+from o3d_relief.bounds.pairs import vertex_pairs
 from o3d_relief.errors import MeshError, ParameterError
 from o3d_relief.journal import Journal, OnStage
 from o3d_relief.linalg.laplacian import cotangent_laplacian
@@ -36,7 +37,6 @@ from o3d_relief.steps import (
     frame_step,
     perspective_step,
     scene_step,
-    stacked_pairs,
     trim_step,
     turned_to_viewer,
     visibility_step,
@@ -107,48 +107,16 @@ def make_relief(
     for name, value, kind in (("params", params, ReliefParams), ("view", view, View)):
         if not isinstance(value, kind):
             raise ParameterError(f"{name} must be a {kind.__name__}. Got {value!r} instead.")
-    scanned = None
-    if isinstance(mesh, o3d.geometry.PointCloud):
-        scanned = scan_points(mesh, scan, view=view, on_stage=on_stage, on_progress=on_progress)
-        mesh = scanned.mesh
-    elif scan is None and isinstance(mesh, Scan):
-        scanned, mesh = mesh, mesh.mesh
-    elif scan is not None:
-        raise ParameterError("scan says how a point cloud is meshed, but the scene is a mesh: leave it out.")
+    mesh, scanned = _meshed(mesh, scan, view, on_stage, on_progress)
     journal = Journal(on_stage, None if scanned is None else scanned.stages, on_progress)
 
     journal.begin("scene")
     in_vertices, in_faces = mesh_arrays(mesh, max_triangles)
     frame = frame_step(in_vertices, in_faces, view)
     scene = journal.keep(scene_step(in_vertices, in_faces, frame, params))
-    faces = scene.faces
     journal.begin("perspective")
     vertices = journal.keep(perspective_step(scene.vertices, view)).vertices
-    keeps_order = params.in_order and not params.bounded
-    with one_beside() as thread:
-        ahead = Ahead(thread, vertices, faces) if keeps_order else None
-        journal.begin("visibility")
-        # Who keeps the order casts more rays through the scene.
-        box = UnitBox(vertices, faces) if keeps_order else None
-        visible = journal.keep(visibility_step(vertices, faces, view, box)).visible
-        settled = params.settled(visible_depth(vertices, visible) * scene.unit)
-        journal.begin("bounded" if params.bounded else "clusters")
-        laplacian, slivers = cotangent_laplacian(vertices, faces)
-        if params.bounded:
-            z = journal.keep(bounded_step(vertices, faces, visible, scene, settled, tick=journal.tick)).z
-        else:
-            z = _attenuated(
-                vertices,
-                visible,
-                laplacian,
-                slivers,
-                scene,
-                Lines(vertices, faces, box),
-                ahead,
-                settled,
-                journal,
-            )
-    del box, ahead  # they take much of the memory, and no more rays are cast
+    z, visible, laplacian = _raised(vertices, scene, params, view, journal)
 
     journal.begin("trim")
     out_faces, turned = turned_to_viewer(in_faces, scene, vertices, visible, laplacian)
@@ -181,6 +149,45 @@ def make_relief(
     )
 
 
+def _meshed(
+    mesh: o3d.geometry.TriangleMesh | o3d.geometry.PointCloud | Scan,
+    scan: ScanParams | None,
+    view: View,
+    on_stage: OnStage | None,
+    on_progress: OnProgress | None,
+) -> tuple[o3d.geometry.TriangleMesh, Scan | None]:
+    """Return the scene as a mesh, and the scan that it is made of, if it is."""
+    if isinstance(mesh, o3d.geometry.PointCloud):
+        scanned = scan_points(mesh, scan, view=view, on_stage=on_stage, on_progress=on_progress)
+        return scanned.mesh, scanned
+    if scan is not None:
+        raise ParameterError("scan says how a point cloud is meshed, but the scene is a mesh: leave it out.")
+    return (mesh.mesh, mesh) if isinstance(mesh, Scan) else (mesh, None)
+
+
+def _raised(
+    vertices: NDArray[np.float64], scene: SceneStage, params: ReliefParams, view: View, journal: Journal
+) -> tuple[NDArray[np.float64], NDArray[np.bool_], sp.csr_array]:
+    """Find the heights of the relief; return what is visible and the cotangent Laplacian as well."""
+    faces = scene.faces
+    keeps_order = params.in_order and not params.bounded
+    with one_beside() as thread:
+        ahead = Ahead(thread, vertices, faces) if keeps_order else None
+        journal.begin("visibility")
+        # Who keeps the order casts more rays through the scene.
+        box = UnitBox(vertices, faces) if keeps_order else None
+        visible = journal.keep(visibility_step(vertices, faces, view, box)).visible
+        settled = params.settled(visible_depth(vertices, visible) * scene.unit)
+        journal.begin("bounded" if params.bounded else "clusters")
+        laplacian, slivers = cotangent_laplacian(vertices, faces)
+        if params.bounded:
+            z = journal.keep(bounded_step(vertices, faces, visible, scene, settled, tick=journal.tick)).z
+        else:
+            lines = Lines(vertices, faces, box)
+            z = _attenuated(vertices, visible, laplacian, slivers, scene, lines, ahead, settled, journal)
+    return z, visible, laplacian
+
+
 def _attenuated(
     vertices: NDArray[np.float64],
     visible: NDArray[np.bool_],
@@ -198,8 +205,9 @@ def _attenuated(
     journal.begin("attenuation")
     points = journal.keep(attenuation_step(vertices, visible, scene, clusters, params))
     journal.begin("construction")
-    pairs = stacked_pairs(lines, params)
-    if ahead is not None and pairs is not None:
+    pairs = None
+    if ahead is not None:
+        pairs = vertex_pairs(lines)
         ahead.stack(lines, pairs, laplacian, fine=params.min_gap > 0.0)
     z = journal.keep(
         construction_step(

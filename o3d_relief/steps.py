@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from o3d_relief.attenuation_step import beta_of_clusters
-from o3d_relief.bounds.lines import Lines
-from o3d_relief.bounds.pairs import Pairs, vertex_pairs
+from o3d_relief.bounds.pairs import Pairs
 from o3d_relief.bounds.parts import tie_parts
 from o3d_relief.errors import MeshError, ParameterError
 from o3d_relief.params import ReliefParams, Triple, View
@@ -134,11 +133,6 @@ def clusters_step(vertices: NDArray[np.float64], params: ReliefParams) -> Cluste
 
 def _behind(z: NDArray[np.float64], visible: NDArray[np.bool_]) -> int:
     return int((z[visible] < 0.0).sum())
-
-
-def stacked_pairs(lines: Lines, params: ReliefParams) -> Pairs | None:
-    """Find what must keep its order at the vertices; None where the order is not kept."""
-    return vertex_pairs(lines) if params.in_order else None
 
 
 def construction_step(

@@ -112,9 +112,8 @@ class Correction:
         upper, lower = pairs.heights(self._z)
         missing = wanted - (upper - lower)
         lift = np.where(floor, -self._z, 0.0)
-        rows = sp.vstack(
-            [pairs.difference(len(self._z)), sp.eye_array(len(self._z), format="csr")[floor]], format="csr"
-        )
+        single = sp.eye_array(len(self._z), format="csr")
+        rows = sp.vstack([pairs.difference(len(self._z)), single[floor]], format="csr")
         rows, least = _once(rows, np.concatenate([missing, lift[floor]]))
         columns = rows.tocsc()
         reach = self._reaches(pairs, missing, lift)

@@ -14,10 +14,11 @@ from o3d_relief.bounds.ragged import combined
 __all__ = ["around", "new_crossings"]
 
 _SHALLOW = 1e-4
-"""The same for crossings that are to be mended: what is deepest between two edges is less deep at them."""
+"""How deep, in place of `DEEP`, surfaces that were apart must cross to be mended: what is deepest between two
+edges is less deep at them."""
 
 _SURE = 0.999 * DEEP
-"""The same for contact that is to be mended: the finished mesh is welded and cut, and rounds once more."""
+"""The same for surfaces in contact: the finished mesh is welded and cut, and rounds once more."""
 
 _FEW = 500
 """So many crossings at most are looked at together with what is next to them."""

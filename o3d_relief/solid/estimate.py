@@ -90,7 +90,7 @@ def estimate_solid(
     check_extents(used)
     scale = scale_for(used[:, :2], plate)
     width, height, scene_depth = np.ptp(used, axis=0) * scale
-    seen_depth = visible_depth(vertices, visibility_step(vertices, faces, view).visible) * unit
+    seen_depth = _seen_depth(vertices, faces, unit, view)
     depth, known = _depth(params, seen_depth, scene_depth, scale / unit)
     if plate.depth_mm is not None:
         depth, known = plate.depth_mm - plate.back_mm, True
@@ -133,7 +133,7 @@ def estimate_relief(
     """
     vertices, faces, unit = _seen(mesh, view, max_triangles)
     width, height, scene_depth = np.ptp(vertices[np.unique(faces)], axis=0) * unit
-    seen_depth = visible_depth(vertices, visibility_step(vertices, faces, view).visible) * unit
+    seen_depth = _seen_depth(vertices, faces, unit, view)
     depth, known = _depth(params, seen_depth, scene_depth, 1.0)
     return Estimate(
         size=(float(width), float(height), depth),
@@ -152,6 +152,11 @@ def _depth(params: ReliefParams, seen_depth: float, most: float, scale: float) -
         return float(most), False
     scaled = cast(float, wanted) * scale
     return float(min(most, scaled)), bool(scaled <= most)
+
+
+def _seen_depth(vertices: NDArray[np.float64], faces: NDArray[np.int64], unit: float, view: View) -> float:
+    """Return the depth of what is visible, in the input's unit."""
+    return visible_depth(vertices, visibility_step(vertices, faces, view).visible) * unit
 
 
 def _memory_mb(faces: NDArray[np.int64]) -> float:
