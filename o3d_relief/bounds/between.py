@@ -38,6 +38,7 @@ class Between:
     def forget(self) -> None:
         """Look everywhere the next time, not only where something has moved."""
         self._last = np.full(len(self._vertices), np.nan)
+        self._not_closer = np.ones(len(self._faces), dtype=bool)
         self._parted.forget()
 
     def look_at(self, z: NDArray[np.float64]) -> tuple[Pairs, int]:
@@ -61,16 +62,22 @@ class Between:
             looked = [new_crossings(vertices, faces[near], edges[own], z)]
             if not own.all():
                 looked.append(new_crossings(vertices, faces[changed], edges[~own], z))
+        self._not_closer |= near
         in_front, behind = z > 0.0, z < 0.0
         cut = near & (in_front[a] | in_front[b] | in_front[c]) & (behind[a] | behind[b] | behind[c])
         at_foot = foot_pairs(vertices, faces[near & self._raster.over_or_under(cut)], edges, z)
         found = Pairs.join([*(pairs for pairs, _ in looked), at_foot])
         return found, sum(count for _, count in looked) + len(at_foot)
 
-    def look_closer(self, z: NDArray[np.float64], pairs: Pairs) -> tuple[Pairs, int]:
-        """Return pairs for what is rare: it hangs together over S, stands at the cut, or crossed before."""
-        hinged = hinged_pairs(self._vertices, self._faces, pairs, z)
+    def look_closer(self, z: NDArray[np.float64], swapped: Pairs) -> tuple[Pairs, int]:
+        """Return pairs for what is rare: it hangs together over S, stands at the cut, or crossed before.
+
+        Of the pairs on lines, those that have changed places behind S are enough. Call `look_at` before.
+        """
+        hinged = hinged_pairs(self._vertices, self._faces, swapped, z)
         parted = self._parted.look_at(z)
         parted = parted.select(out_of_order(parted, z))
-        cut, count = cut_crossings(self._vertices, self._faces, self._raster, z)
+        cut, count = cut_crossings(self._vertices, self._faces, self._raster, z, among=self._not_closer)
+        if count == 0:
+            self._not_closer[:] = False
         return Pairs.join([hinged, parted, cut]), len(hinged) + len(parted) + count

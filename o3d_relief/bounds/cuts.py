@@ -21,6 +21,8 @@ def cut_crossings(
     faces: NDArray[np.int64],
     raster: Raster,
     z: NDArray[np.float64],
+    *,
+    among: NDArray[np.bool_] | None = None,
 ) -> tuple[Pairs, int]:
     """Find where the new edges of trimmed triangles would pierce others, and did not before.
 
@@ -37,6 +39,8 @@ def cut_crossings(
         Of the faces.
     z : (n,) float64
         Heights now.
+    among : (m,) bool, optional
+        The triangles whose diagonals are looked at, without it all.
 
     Returns
     -------
@@ -47,8 +51,9 @@ def cut_crossings(
     """
     # Two corners in front of S, one behind.
     side = np.where(z > 0.0, 1, np.where(z < 0.0, -5, 0)).astype(np.int8)
+    among = np.ones(len(faces), dtype=bool) if among is None else among
     one, two, three = side[faces].T
-    cut = np.flatnonzero(one + two + three == -3)
+    cut = np.flatnonzero((one + two + three == -3) & among)
     cut = cut[_narrow(vertices[:, :2], faces[cut])]
     if len(cut) == 0:
         return Pairs.join([]), 0

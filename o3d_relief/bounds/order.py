@@ -119,7 +119,7 @@ def keep_order(
             found, count = between.look_at(current)
             left += count
             if left <= _HARDLY_ANY:
-                rare, count = between.look_closer(current, pairs)
+                rare, count = between.look_closer(current, lines.swapped)
                 found, left = Pairs.join([found, rare]), left + count
             found = found.select(np.subtract(*found.heights(current)) < required_gaps(found, min_gap))
             if left < fewest:
@@ -157,16 +157,23 @@ class _Lines:
         self._lacking = np.zeros(len(pairs))
         self._held = np.zeros(len(pairs), dtype=bool)
         self._ever, self._again = self._held.copy(), self._held.copy()
+        self._swapped = self._held.copy()
         self.wrong = self._held.copy()
 
     @property
     def held(self) -> Pairs:
         return self._pairs.select(self._held)
 
+    @property
+    def swapped(self) -> Pairs:
+        """Those that have changed places behind S, up to rounding errors."""
+        return self._pairs.select(self._swapped)
+
     def look_at(self, z: NDArray[np.float64]) -> None:
         """Find what is wrong now."""
         upper, lower = self._upper @ z, self._lower @ z
         self._lacking = self._required - (upper - lower)
+        self._swapped = (upper < lower) & (lower < EXACT)
         self.wrong = (self._lacking > EXACT) & (np.maximum(upper, lower) > 0.0)
 
     def let_go(self, z: NDArray[np.float64]) -> None:

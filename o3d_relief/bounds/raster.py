@@ -31,15 +31,21 @@ class Raster:
         """Find the triangles (m,) that may lie above or below some of them, (m,)."""
         chosen = np.flatnonzero(changed)
         # Count, in each cell of a raster, the boxes of triangles that changed; then ask for the boxes of all.
-        steps = np.zeros(_WIDE * _WIDE, dtype=np.int64)
-        for corners, sign in ((self._plus, 1), (self._minus, -1)):
-            for corner in corners:
-                steps += sign * np.bincount(corner[chosen], minlength=len(steps))
-        marked = steps.reshape(_WIDE, _WIDE).cumsum(axis=0).cumsum(axis=1)[:-1, :-1] > 0
+        more, less = (
+            np.bincount(np.concatenate([corner.take(chosen) for corner in corners]), minlength=_WIDE * _WIDE)
+            for corners in (self._plus, self._minus)
+        )
+        steps = (more - less).astype(np.int32).reshape(_WIDE, _WIDE)
+        marked = _summed(steps)[:-1, :-1] > 0
         total = np.zeros((_WIDE, _WIDE), dtype=np.int32)
-        total[1:, 1:] = marked.cumsum(axis=0).cumsum(axis=1)
+        total[1:, 1:] = _summed(marked)
         flat = total.ravel()
-        within = flat[self._plus[0]] + flat[self._plus[1]]
-        within -= flat[self._minus[0]]
-        within -= flat[self._minus[1]]
+        within = flat.take(self._plus[0]) + flat.take(self._plus[1])
+        within -= flat.take(self._minus[0])
+        within -= flat.take(self._minus[1])
         return np.asarray(within > 0)
+
+
+def _summed(cells: NDArray[np.generic]) -> NDArray[np.int32]:
+    """Return the sums over all cells of a raster that are not further along x and y; int32 is faster."""
+    return np.asarray(np.cumsum(np.cumsum(cells, axis=0, dtype=np.int32), axis=1, dtype=np.int32))

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from o3d_relief import cotangent_laplacian
+from o3d_relief.bounds.between import Between
 from o3d_relief.bounds.crossings import edges_of
 from o3d_relief.bounds.cuts import cut_crossings
 from o3d_relief.bounds.new_crossings import new_crossings
@@ -55,3 +56,20 @@ def test_the_diagonal_is_the_one_that_the_trim_makes():
 def test_what_shows_as_a_surface_is_left_to_its_edges():
     vertices, faces = _hanging(shift=1.0)
     assert cut_crossings(vertices, faces, Raster(vertices, faces), RISEN)[1] == 0
+
+
+def test_only_diagonals_of_the_triangles_asked_for_are_looked_at():
+    vertices, faces = _hanging()
+    for blade, count in ((False, 0), (True, 1)):
+        among = np.array([not blade, not blade, blade])
+        assert cut_crossings(vertices, faces, Raster(vertices, faces), RISEN, among=among)[1] == count
+
+
+def test_a_blade_is_told_of_until_it_has_gone_back():
+    vertices, faces = _hanging()
+    none = Pairs.join([])
+    between = Between(vertices, faces, cotangent_laplacian(vertices, faces)[0])
+    before = vertices[:, 2] + 1.0
+    for z, count in ((before, 0), (RISEN, 1), (RISEN, 1), (before, 0), (before, 0), (RISEN, 1)):
+        between.look_at(z)
+        assert between.look_closer(z, none)[1] == count
