@@ -41,10 +41,13 @@ def test_table_has_a_row_for_everything_that_is_run(tmp_path, monkeypatch, capsy
 
 def test_profile_names_the_functions_that_take_the_time():
     mesh = to_mesh(bust(40))
+    rel.make_relief(mesh, rel.ReliefParams(k=8))  # what is imported at the first call is none of its time
     told = speed.profile(lambda: rel.make_relief(mesh, rel.ReliefParams(k=8)))
     cells = [[cell.strip() for cell in row.split("|")[1:-1]] for row in told[2:]]
-    assert cells[0][0] == "pipeline.make_relief"
-    assert any(name.startswith("bounds/") for name, *_ in cells)
+    # What runs in threads beside, too. Not the outermost functions: Python 3.13 loses them.
+    assert {"restoration_step.restoration_step", "bounds/columns.column_pairs"} <= {
+        name for name, *_ in cells
+    }
     whole = [float(seconds) for _, _, seconds, _ in cells]
     assert whole == sorted(whole, reverse=True)
     assert whole[-1] >= 0.0199 * whole[0] - 0.005
