@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -32,6 +34,24 @@ def test_pixels_cover_the_piece_whatever_their_size():
     assert field.inside.all()
     assert field.left == pytest.approx(-86 * 0.35)
     assert field.top == pytest.approx(58 * 0.35)
+
+
+def test_field_moves_with_the_piece():
+    solid, way = ball_on_slab(colored=True), np.array([7.0, -30.0, 2.5])
+    field, moved = (
+        height_field(replace(solid, vertices=solid.vertices + by), 0.5) for by in (0.0 * way, way)
+    )
+    np.testing.assert_allclose(moved.z, field.z + 2.5, atol=1e-4)
+    np.testing.assert_allclose(moved.colors, field.colors, atol=1e-4)
+    assert (moved.left, moved.top) == (field.left + 7.0, field.top - 30.0)
+    assert (moved.back, moved.highest) == (-1.5, field.highest + 2.5)
+
+
+def test_no_face_is_looked_through():
+    solid = slab()
+    for first in range(len(solid.faces)):
+        faces, is_plate = np.roll(solid.faces, first, axis=0), np.roll(solid.is_plate, first)
+        assert height_field(replace(solid, faces=faces, is_plate=is_plate), 2.0).inside.all()
 
 
 def test_pixels_beside_the_piece_are_empty():
