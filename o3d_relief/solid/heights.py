@@ -17,6 +17,8 @@ __all__ = ["HeightField", "check_pixels", "height_field"]
 _MOST_PIXELS = 40_000_000
 """Of a height field: about 8 GB of memory."""
 _RAYS_AT_ONCE = 2_000_000
+_BESIDE = ((1e-6, 1e-6), (-1e-6, 1e-6), (-1e-6, -1e-6), (1e-6, -1e-6))
+"""Where a ray that has slipped through is cast again, as shares of the solid's size."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -175,15 +177,37 @@ def _first_hits(
     y: NDArray[np.float64],
     above: float,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return the face that each ray meets first (rows, columns), -1 for none, and the corners' weights."""
+    """Return the face that each ray meets first (rows, columns), -1 for none, and the corners' weights.
+
+    A ray right at a vertex may slip between the faces there. It then meets a face from inside the solid, and
+    is cast again a hair beside.
+    """
     rays = np.zeros((len(y), len(x), 6), dtype=np.float32)
     rays[..., 0] = (x - center[0]) / size
     rays[..., 1] = ((y - center[1]) / size)[:, None]
     rays[..., 2] = (above - center[2]) / size + 0.1
     rays[..., 5] = -1.0
+    face, weights, slipped = _cast(scene, rays)
+    for sideways in _BESIDE:
+        if not slipped.any():
+            break
+        again = rays[slipped]
+        again[:, :2] += np.array(sideways, dtype=np.float32)
+        found, shares, inside = _cast(scene, again)
+        good = (found >= 0) & ~inside
+        mended = tuple(axis[good] for axis in np.nonzero(slipped))
+        face[mended], weights[mended], slipped[mended] = found[good], shares[good], False
+    return face, weights
+
+
+def _cast(
+    scene: o3d.t.geometry.RaycastingScene, rays: NDArray[np.float32]
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]]:
+    """Return the face that each ray meets first, the weights of its corners, and whether from inside."""
     answer = scene.cast_rays(o3d.core.Tensor(rays))
     identity = answer["primitive_ids"].numpy()
     face = np.where(identity == scene.INVALID_ID, -1, identity.astype(np.int64))
     uv = np.clip(answer["primitive_uvs"].numpy().astype(np.float64), 0.0, 1.0)
     first = np.clip(1.0 - uv.sum(axis=-1, keepdims=True), 0.0, 1.0)
-    return face, np.concatenate([first, uv], axis=-1)
+    inside = (face >= 0) & (answer["primitive_normals"].numpy()[..., 2] < 0.0)
+    return face, np.concatenate([first, uv], axis=-1), inside

@@ -29,12 +29,17 @@ def test_solid_under_a_field_has_no_undercut(colored):
     assert (made.colors is not None) == colored
 
 
-def test_field_of_the_solid_under_a_field_is_the_field():
-    solid = ball_on_slab()
+@pytest.mark.parametrize("colored", [False, True])
+def test_field_of_the_solid_under_a_field_is_the_field(colored):
+    solid = ball_on_slab(colored=colored)
     field = height_field(solid, 0.5)
     again = height_field(solid_under(field, solid), 0.5)
     assert again.z.shape == field.z.shape
     assert np.abs(again.z - field.z).max() < 0.01  # flat to a hundredth of a pixel, 0.005
+    assert (again.is_plate != field.is_plate).mean() < 0.01  # but at the rim of the ball
+    if colored:
+        same = again.is_plate == field.is_plate
+        np.testing.assert_allclose(again.colors[same], field.colors[same], atol=0.02)
 
 
 def test_outline_is_cut_exactly():
