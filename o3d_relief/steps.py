@@ -36,6 +36,22 @@ from o3d_relief.stages.perspective import forced_perspective
 from o3d_relief.stages.trim import Trimmed, trim_behind
 from o3d_relief.stages.visibility import turned_away, visible_vertices
 
+__all__ = [
+    "check_k",
+    "clusters_step",
+    "compression_step",
+    "construction_step",
+    "frame_step",
+    "on_plane",
+    "perspective_step",
+    "ratios",
+    "scene_step",
+    "trim_step",
+    "turned_to_viewer",
+    "visibility_step",
+    "visible_depth",
+]
+
 _OUT_OF_SHAPE = 1e3
 """A forced perspective that makes the scene larger or smaller by more than this leaves nothing of it."""
 
