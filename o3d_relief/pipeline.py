@@ -38,12 +38,11 @@ from o3d_relief.steps import (
     frame_step,
     perspective_step,
     scene_step,
-    trim_step,
-    turned_to_viewer,
     visibility_step,
     visible_depth,
 )
 from o3d_relief.threads import one_beside
+from o3d_relief.trim_step import trim_step, turned_to_viewer
 
 __all__ = ["make_relief"]
 
