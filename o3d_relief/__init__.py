@@ -39,11 +39,12 @@ if TYPE_CHECKING:
     from o3d_relief.show.render import render, save_png
     from o3d_relief.show.sheets import contact_sheet
     from o3d_relief.show.viewer import StageViewer, show_stages
+    from o3d_relief.solid.block import solid_under
     from o3d_relief.solid.body import Solid
     from o3d_relief.solid.checks import SolidReport, check_solid
     from o3d_relief.solid.formats import write_solid
     from o3d_relief.solid.heightmap import write_height_map
-    from o3d_relief.solid.heights import height_field, solid_under
+    from o3d_relief.solid.heights import height_field
     from o3d_relief.solid.make import make_solid
     from o3d_relief.solid.milling import milled
     from o3d_relief.solid.tiles import make_tiles
@@ -134,7 +135,7 @@ _HOME = {
     "make_solid": "solid.make",
     "make_tiles": "solid.tiles",
     "height_field": "solid.heights",
-    "solid_under": "solid.heights",
+    "solid_under": "solid.block",
     "milled": "solid.milling",
     "write_height_map": "solid.heightmap",
     "write_solid": "solid.formats",

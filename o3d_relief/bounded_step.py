@@ -54,7 +54,7 @@ def bounded_step(
     tick: Tick = silent,
 ) -> BoundedStage:
     """Find the closest relief of the wanted depth."""
-    z, n = vertices[:, 2], len(vertices)
+    z = vertices[:, 2]
     tick(0.0)
     face, share = seen_points(vertices, faces)
     in_front = seen_faces(faces, visible, face)
@@ -65,7 +65,8 @@ def bounded_step(
     deep = float(z.max()) - lowest
     depth = cast(float, params.depth) / scene.unit
     shallow_enough = deep <= depth * (1.0 + _ROUNDING)
-    weight = kept * face_weights(vertices, faces, in_front, 1.0 if shallow_enough else depth / deep)
+    ratio = 1.0 if shallow_enough else depth / deep
+    weight = kept * face_weights(vertices, faces, in_front, ratio)
     if shallow_enough:
         shallow = {"already_shallower": 1, "attached_missed": int((z[attached] > lowest).sum())}
         return BoundedStage(face_weight=weight, attached=attached, z=on_plane(z - lowest), counts=shallow)
@@ -73,24 +74,19 @@ def bounded_step(
     _check_depth(depth, scene.unit)
     form, slivers = cotangent_laplacian(vertices, faces, weights=weight)
     middle = (float(z.max()) + lowest) / 2.0
-    pull = side_pull(vertices, faces, middle + (z - middle) * (depth / deep), in_front, kept, depth / deep)
+    pull = side_pull(vertices, faces, middle + (z - middle) * ratio, in_front, kept, ratio)
     tick(_PULLED)
-    lines = Lines(vertices, faces)
-    stacked = vertex_pairs(lines)
-    ties = tie_parts(
-        vertices, faces, form, np.arange(n), stacked, stacked.gap * (depth / deep), across_gaps=_EMPTY
-    )
-    pairs = _stacked(vertices, faces, lines, stacked, params)
+    form, pull, pairs = _tied(vertices, faces, form, pull, ratio, params)
     tick(_PAIRED)
     found = closest_relief(
         vertices,
         faces,
-        form if ties is None else form + ties.among_held,
+        form,
         depth,
         pairs,
         seen,
         visible,
-        pull=pull if ties is None else pull + ties.among_held_pull,
+        pull=pull,
         min_gap=params.min_gap / scene.unit,
         attach=attached,
         tick=lambda share: tick(None if share is None else _PAIRED + (1.0 - _PAIRED) * share),
@@ -131,6 +127,25 @@ def _seen_rows(
     """Return the rows of the seen points whose faces have hidden corners: others are in front with these."""
     partly = ~visible[faces[face]].all(axis=1)
     return point_rows(faces[face[partly]], share[partly], len(visible))
+
+
+def _tied(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    form: sp.csr_array,
+    pull: NDArray[np.float64],
+    ratio: float,
+    params: ReliefParams,
+) -> tuple[sp.csr_array, NDArray[np.float64], Pairs]:
+    """Add springs between parts to the energy and its pull; return all that is stacked, too."""
+    lines = Lines(vertices, faces)
+    stacked = vertex_pairs(lines)
+    every = np.arange(len(vertices))
+    ties = tie_parts(vertices, faces, form, every, stacked, stacked.gap * ratio, across_gaps=_EMPTY)
+    pairs = _stacked(vertices, faces, lines, stacked, params)
+    if ties is None:
+        return form, pull, pairs
+    return form + ties.among_held, pull + ties.among_held_pull, pairs
 
 
 def _stacked(

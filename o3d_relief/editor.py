@@ -15,6 +15,7 @@ from o3d_relief.errors import MeshError, ParameterError
 from o3d_relief.history import History
 from o3d_relief.journal import OnStage
 from o3d_relief.live_scene import LivePoints, LiveScene
+from o3d_relief.param_checks import given
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.params_file import load_params, save_params
 from o3d_relief.pipeline import make_relief
@@ -110,11 +111,7 @@ class ReliefEditor:
                 f"The editor takes an open3d.geometry.TriangleMesh. Got a {type(mesh).__name__} instead: "
                 "make a mesh of a point cloud by mesh_from_points first."
             )
-        params = ReliefParams() if params is None else params
-        view = View() if view is None else view
-        for name, value, kind in (("params", params, ReliefParams), ("view", view, View)):
-            if not isinstance(value, kind):
-                raise ParameterError(f"{name} must be a {kind.__name__}. Got {value!r} instead.")
+        params, view = given("params", params, ReliefParams), given("view", view, View)
         self._mesh = o3d.geometry.TriangleMesh(mesh)
         self._first = params, view
         self._history: History[tuple[ReliefParams, View]] = History()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from numbers import Integral
+from typing import TypeVar
 
 from o3d_relief.errors import ParameterError
 
@@ -19,11 +20,22 @@ __all__ = [
     "check_range",
     "check_triple",
     "check_weights",
+    "given",
 ]
 
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 Triple = tuple[float, float, float]
+
+_Kind = TypeVar("_Kind")
+
+
+def given(name: str, value: _Kind | None, kind: type[_Kind]) -> _Kind:
+    """Return parameters of a kind, its defaults for None."""
+    value = kind() if value is None else value
+    if not isinstance(value, kind):
+        raise ParameterError(f"{name} must be a {kind.__name__}. Got {value!r} instead.")
+    return value
 
 
 def check_number(name: str, value: object) -> float:

@@ -21,6 +21,7 @@ from o3d_relief.linalg.laplacian import cotangent_laplacian
 from o3d_relief.memory import memory_kept
 from o3d_relief.order_step import order_step
 from o3d_relief.output import trimmed_mesh
+from o3d_relief.param_checks import given
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.progress import OnProgress
 from o3d_relief.rays import UnitBox
@@ -37,12 +38,11 @@ from o3d_relief.steps import (
     frame_step,
     perspective_step,
     scene_step,
-    trim_step,
-    turned_to_viewer,
     visibility_step,
     visible_depth,
 )
 from o3d_relief.threads import one_beside
+from o3d_relief.trim_step import trim_step, turned_to_viewer
 
 __all__ = ["make_relief"]
 
@@ -102,11 +102,7 @@ def make_relief(
     >>> list(relief.stages)[:3]
     ['scene', 'perspective', 'visibility']
     """
-    params = ReliefParams() if params is None else params
-    view = View() if view is None else view
-    for name, value, kind in (("params", params, ReliefParams), ("view", view, View)):
-        if not isinstance(value, kind):
-            raise ParameterError(f"{name} must be a {kind.__name__}. Got {value!r} instead.")
+    params, view = given("params", params, ReliefParams), given("view", view, View)
     mesh, scanned = _meshed(mesh, scan, view, on_stage, on_progress)
     journal = Journal(on_stage, None if scanned is None else scanned.stages, on_progress)
 

@@ -7,7 +7,6 @@ from typing import cast
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 
 from o3d_relief.attenuation_step import beta_of_clusters
 from o3d_relief.bounds.pairs import Pairs
@@ -27,14 +26,26 @@ from o3d_relief.records import (
 )
 from o3d_relief.scene.frame import RELIEF_UNITS, Frame, relief_frame, to_relief_units
 from o3d_relief.scene.weld import weld
-from o3d_relief.scene.winding import wrongly_wound
 from o3d_relief.stages.attenuation import attenuate
 from o3d_relief.stages.clustering import cluster_vertices
 from o3d_relief.stages.compression import alpha_for_depth, compress
 from o3d_relief.stages.construction import construct
 from o3d_relief.stages.perspective import forced_perspective
-from o3d_relief.stages.trim import Trimmed, trim_behind
-from o3d_relief.stages.visibility import turned_away, visible_vertices
+from o3d_relief.stages.visibility import visible_vertices
+
+__all__ = [
+    "check_k",
+    "clusters_step",
+    "compression_step",
+    "construction_step",
+    "frame_step",
+    "on_plane",
+    "perspective_step",
+    "ratios",
+    "scene_step",
+    "visibility_step",
+    "visible_depth",
+]
 
 _OUT_OF_SHAPE = 1e3
 """A forced perspective that makes the scene larger or smaller by more than this leaves nothing of it."""
@@ -204,45 +215,3 @@ def compression_step(z: NDArray[np.float64], params: ReliefParams, unit: float) 
         return CompressionStage(alpha=np.ones(len(z)), z=z, counts=counts)
     ratio, compressed = compress(z, alpha=largest, alpha_min=smallest)
     return CompressionStage(alpha=ratio, z=compressed, counts=counts)
-
-
-def trim_step(
-    in_vertices: NDArray[np.float64],
-    in_faces: NDArray[np.int64],
-    frame: Frame,
-    scene: SceneStage,
-    vertices: NDArray[np.float64],
-    z: NDArray[np.float64],
-) -> Trimmed:
-    """Move every input vertex as its welded vertex moved, and cut at S; the result is in the input's unit."""
-    usable = scene.welded_index >= 0
-    welded = scene.welded_index[usable]
-    moved = to_relief_units(in_vertices, frame)
-    moved[usable, :2] += (vertices - scene.vertices)[welded, :2]
-    moved[usable, 2] = z[welded]
-    return trim_behind(moved * frame.unit, in_faces, usable)
-
-
-def turned_to_viewer(
-    in_faces: NDArray[np.int64],
-    scene: SceneStage,
-    vertices: NDArray[np.float64],
-    visible: NDArray[np.bool_],
-    laplacian: sp.csr_array,
-) -> tuple[NDArray[np.int64], int]:
-    """Turn faces that disagree with their surface, and components that show their inside.
-
-    Return the faces and how many were turned. Of duplicate faces all are turned or none: where a surface has
-    both its sides, it keeps them.
-    """
-    _, label = connected_components(laplacian, directed=False)
-    wrong = wrongly_wound(vertices, scene.faces)
-    wound = _turned(scene.faces, wrong)
-    away = turned_away(vertices, wound, visible, label)
-    turn = np.append(wrong ^ away[label[scene.faces[:, 0]]], False)[scene.welded_face]  # -1 takes the last
-    return _turned(in_faces, turn), int(turn.sum())
-
-
-def _turned(faces: NDArray[np.int64], chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return faces, some of them turned round."""
-    return np.where(chosen[:, None], faces[:, [0, 2, 1]], faces) if chosen.any() else faces

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from o3d_relief.errors import FileError
+from o3d_relief.solid.block import solid_under
 from o3d_relief.solid.body import Solid
 from o3d_relief.solid.formats import write_solids
 from o3d_relief.solid.heightmap import height_map_scale, write_height_map
-from o3d_relief.solid.heights import HeightField, height_field, solid_under
+from o3d_relief.solid.heights import HeightField, height_field
 from o3d_relief.solid.milling import milled
 from o3d_relief.solid.tiles import Tiling, make_tiles
 from o3d_relief.workshop_params import MillParams, TileParams

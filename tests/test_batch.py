@@ -322,6 +322,21 @@ def test_switches_are_checked(tmp_path, name):
     assert not out.exists()
 
 
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"params": {"k": 3}}, "params must be a ReliefParams"),
+        ({"view": "z"}, "view must be a View"),
+        ({"scan": {}}, "scan must be a ScanParams"),
+    ],
+)
+def test_parameters_of_another_kind_are_refused_at_once(tmp_path, wrong, words):
+    inputs, out = write_balls(tmp_path / "in", 1), tmp_path / "out"
+    with pytest.raises(rel.ParameterError, match=words):
+        rel.make_reliefs(inputs, out, **wrong)
+    assert not out.exists()
+
+
 def test_called_off(tmp_path):
     inputs, out = write_balls(tmp_path / "in", 6), tmp_path / "out"
     params = rel.ReliefParams(k=4, in_order=False)

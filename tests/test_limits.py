@@ -63,6 +63,7 @@ def test_sizes_in_words():
 
 
 def test_triangles():
+    limits.check_triangles(1, 1)
     limits.check_triangles(limits.MAX_TRIANGLES // 1000)
     with pytest.raises(MeshError, match=r"10,000,001 triangles, more than the 10,000,000 that are accepted"):
         limits.check_triangles(10_000_001)

@@ -1,4 +1,5 @@
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -33,9 +34,11 @@ from o3d_relief import ParameterError, ReliefParams, View
         ({"k": 10**400}, "k must be a number"),
         ({"k": "5"}, "k must be a number"),
         ({"min_gap": -1}, "min_gap must be at least 0"),
-        ({"min_gap": 1, "in_order": False}, "min_gap needs in_order"),
+        ({"min_gap": 1e-3, "in_order": False}, "min_gap needs in_order"),
         ({"in_front": None}, "in_front must be True or False"),
         ({"seed": -1}, "seed must be at least 0"),
+        ({"seed": 2**32}, "seed must be"),
+        ({"k": 2**31}, "k must be"),
         ({"mode": "flat"}, 'mode must be "attenuation" or "bounded"'),
         ({"mode": "bounded"}, 'mode="bounded" needs a depth'),
         ({"mode": "bounded", "alpha": 0.5}, 'mode="bounded" needs a depth'),
@@ -76,6 +79,31 @@ def test_wrong_views_are_named(values, words):
         View(**values)
 
 
+@pytest.mark.parametrize("factor", [-3.0, 1e-5, 1e8])
+def test_a_view_needs_an_up_that_is_not_its_front(factor):
+    for front in np.random.default_rng(4).normal(size=(10, 3)):
+        with pytest.raises(ParameterError, match="up must not be parallel to front"):
+            View(front=front, up=factor * front)
+        for axis in np.eye(3):
+            View(front=front, up=factor * np.cross(front, axis))
+            View(front=front, up=factor * (front + 1e-6 * axis))
+
+
+@pytest.mark.parametrize(("front", "up"), [("x", "z"), ("y", "z"), ("z", "y"), ((0, 3, 1), "z")])
+def test_another_up_is_proposed_that_will_do(front, up):
+    with pytest.raises(ParameterError, match=f"give another up, for instance {up}"):
+        View(front=front, up=front)
+    View(front=front, up=up)
+
+
+def test_directions_have_no_negative_zeros():
+    for axis in "xyz":
+        for sign in "+-":
+            for view in (View(front=sign + axis, up=(1, 2, 3)), View(front=(1, 2, 3), up=sign + axis)):
+                assert "-0.0" not in repr(view)
+    assert "-0.0" not in repr(View(front=(-0.0, -0.0, 1), up=(1, -0.0, -0.0)))
+
+
 def test_directions_by_letter():
     view = View(front="-y", up="+z")
     assert view.front == (0.0, -1.0, 0.0)
@@ -89,6 +117,41 @@ def test_numpy_values_are_taken_as_plain_numbers():
     assert params.beta == (0.1, 0.3)
     assert ReliefParams(beta=np.array(0.4)).beta == 0.4
     assert View(front=(0, 0, 1e-200)).front == View(front=(0, 0, 1e200)).front == (0.0, 0.0, 1.0)
+
+
+def test_limits_belong_to_what_is_allowed():
+    assert ReliefParams(k=1, seed=2**32 - 1, beta=0.0, min_gap=0.0).seed == 2**32 - 1
+    assert ReliefParams(k=2**31 - 1).k == 2**31 - 1
+    assert ReliefParams(attach_below=0.5, discard_above=0.5).attach_below == 0.5
+    assert ReliefParams(attach_below=0.0, discard_above=1.0, blend=1.0).discard_above == 1.0
+    assert ReliefParams(alpha=0.4, alpha_min=0.4).alpha_min == 0.4
+    assert ReliefParams(alpha_min=1.0).alpha_min == 1.0
+    assert ReliefParams(depth="0.05%", attach=[0], weights=[1e-3, 5.0]).weights == (1e-3, 5.0)
+
+
+def test_defaults_are_those_of_the_readme():
+    text = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+    words = {None: "none", True: "on", False: "off", (): "none"}
+    told = {}
+    for line in text.splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        if len(cells) == 4 and cells[0].startswith("`") and "View" not in cells[0]:
+            told |= {name.strip("`"): cells[2] for name in cells[0].split(", ")}
+    params = ReliefParams()
+    values = {item.name: getattr(params, item.name) for item in dataclasses.fields(params)}
+    assert told == {
+        name: f"{value:g}" if type(value) in (int, float) else words[value] for name, value in values.items()
+    }
+
+
+def test_the_paper_has_none_of_the_guarantees():
+    paper = ReliefParams.paper(k=7)
+    guarantees = {"smooth_points": False, "in_front": False, "in_order": False}
+    assert paper == ReliefParams(k=7, mode="attenuation", **guarantees)
+
+
+def test_what_is_printed_is_short():
+    assert "weights" not in repr(ReliefParams(depth=3, weights=np.ones(1000)))
 
 
 def test_a_depth_chooses_the_mode():
@@ -118,3 +181,5 @@ def test_what_has_no_effect():
 def test_parameters_cannot_be_changed():
     with pytest.raises(dataclasses.FrozenInstanceError):
         ReliefParams().k = 3
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        View().front = "x"

@@ -43,6 +43,16 @@ def test_what_is_saved_is_loaded(tmp_path, params, view):
     assert set(written) == set(ReliefParams.__dataclass_fields__)  # defaults may change, files do not
 
 
+@pytest.mark.parametrize(
+    ("params", "view", "words"),
+    [(View(), None, "params must be a ReliefParams"), (ReliefParams(), "z", "view must be a View")],
+)
+def test_nothing_else_is_saved(tmp_path, params, view, words):
+    with pytest.raises(ParameterError, match=words):
+        save_params(tmp_path / "params.json", params, view)
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_small_file_by_hand(tmp_path):
     path = tmp_path / "params.json"
     path.write_text('\ufeff{"params": {"k": 9, "point_edits": [{"vertex": 2, "beta": 1}]}}', encoding="utf-8")

@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import warnings
-from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-from urllib.parse import unquote
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING
 
 from o3d_relief.errors import FileError, MeshError
 from o3d_relief.limits import check_file_size
 from o3d_relief.scene.arrays import CloudArrays, MeshArrays, to_open3d
 from o3d_relief.scene.gltf import decode_gltf
 from o3d_relief.scene.las import decode_las
+from o3d_relief.scene.named_files import NamedFiles, to_texture
 from o3d_relief.scene.obj import decode_obj
 from o3d_relief.scene.off import decode_off
 from o3d_relief.scene.pcd import decode_pcd
@@ -195,71 +190,16 @@ def _read_bytes(path: Path) -> bytes:
 
 
 def _decode(path: Path, data: bytes) -> MeshArrays:
-    kind = path.suffix.lower()[1:]
-
-    def read_file(name: str) -> bytes | None:
-        return _read_neighbour(path.parent, name)
-
-    def read_texture(name: str) -> NDArray[np.uint8] | None:
-        content = read_file(name)
-        return None if content is None else _to_texture(BytesIO(content))
-
+    kind, named = path.suffix.lower()[1:], NamedFiles(path.parent)
     if kind == "ply":
-        return decode_ply(data, read_texture)
+        return decode_ply(data, named.texture)
     if kind == "obj":
-        return decode_obj(data, read_file, read_texture)
+        return decode_obj(data, named.read, named.texture)
     if kind == "stl":
         return decode_stl(data)
     if kind == "off":
         return decode_off(data)
-    return decode_gltf(data, kind, _Neighbours(path.parent), _to_texture)
-
-
-class _Neighbours:
-    """Finds the files that a glTF file names, for trimesh."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-
-    def get(self, name: str) -> bytes:
-        content = _read_neighbour(self._folder, name)
-        if content is None:
-            content = _read_neighbour(self._folder, unquote(name))
-        if content is None:
-            raise FileNotFoundError(name)
-        return content
-
-    __getitem__ = get
-
-
-def _read_neighbour(folder: Path, name: str) -> bytes | None:
-    """Read a file that another one names; where its folder is unknown here, look beside the other one.
-
-    None where there is none.
-    """
-    name = name.strip().strip('"').replace("\\", "/")
-    for place in (folder / name, folder / Path(name).name):
-        try:
-            if place.is_file():  # a device would never end
-                check_file_size(place, place.stat().st_size)
-                return place.read_bytes()
-        except (OSError, ValueError):  # one that is too large for the memory, too
-            continue
-    return None
-
-
-def _to_texture(source: Any) -> NDArray[np.uint8] | None:
-    """Turn a PIL picture, or a stream of one, into a texture (h, w, 3) with its bottom row first."""
-    from PIL import Image
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of Pillow, on odd but readable pictures
-        try:
-            image = source if isinstance(source, Image.Image) else Image.open(source)
-            pixels = np.asarray(image.convert("RGB"))
-        except (OSError, SyntaxError, ValueError, Image.DecompressionBombError):
-            return None
-    return np.ascontiguousarray(pixels[::-1])
+    return decode_gltf(data, kind, named, to_texture)
 
 
 def _check_indices(arrays: MeshArrays) -> None:

@@ -11,11 +11,21 @@ from numpy.typing import NDArray
 
 from o3d_relief.errors import ParameterError
 from o3d_relief.records import PerspectiveStage, SceneStage, StageRecord
+from o3d_relief.show.camera import view_direction
 
 if TYPE_CHECKING:
     import open3d as o3d
 
-__all__ = ["Easel", "Pictures"]
+__all__ = ["OBLIQUE", "SIDE", "STILL", "Easel", "Pictures"]
+
+OBLIQUE = view_direction(38.0, 12.0)
+"""From where most right panels are seen."""
+
+SIDE = view_direction(65.0, 8.0)
+"""From where depth is seen best."""
+
+STILL = 1e-9
+"""Relief units up to which nothing has moved and nothing stands out: there is no scale for that."""
 
 Pictures = list[NDArray[np.uint8]]
 _Record = TypeVar("_Record", bound=StageRecord)

@@ -14,8 +14,8 @@ from o3d_relief.editor import EditorPoints
 from o3d_relief.show.live_mesh import LiveMesh
 from o3d_relief.show.paint import PLASTER
 from o3d_relief.show.render import plate_bounds
+from o3d_relief.show.scene_panels import ACTIONS
 from o3d_relief.show.sight import Sight
-from o3d_relief.show.stage_panels import ACTIONS
 
 __all__ = ["EditorScene", "nearest_point", "points_within"]
 

@@ -19,7 +19,7 @@ from o3d_relief.records import (
 )
 from o3d_relief.show.colors import apply_colormap, label_colors
 from o3d_relief.show.paint import PLASTER
-from o3d_relief.show.stage_panels import ACTIONS, HIDDEN, SEEN
+from o3d_relief.show.scene_panels import ACTIONS, HIDDEN, SEEN
 from o3d_relief.show.stage_surfaces import StageSurfaces
 
 __all__ = ["MEANINGS", "Meaning", "Painted", "meanings_of", "own_meaning"]

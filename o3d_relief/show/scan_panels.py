@@ -20,9 +20,8 @@ from o3d_relief.scan_records import (
     SurfaceStage,
 )
 from o3d_relief.scene.frame import Frame, relief_frame, to_relief_units
-from o3d_relief.show.easel import Easel, Pictures
+from o3d_relief.show.easel import OBLIQUE, Easel, Pictures
 from o3d_relief.show.render import render
-from o3d_relief.show.stage_panels import OBLIQUE
 
 if TYPE_CHECKING:
     import open3d as o3d

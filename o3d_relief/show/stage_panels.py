@@ -1,4 +1,4 @@
-"""The two panels of each stage's picture."""
+"""The two panels of each stage that gives the scene another shape, and the table of all stages."""
 
 from __future__ import annotations
 
@@ -8,9 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from o3d_relief.records import (
-    AttenuationStage,
     BoundedStage,
-    ClustersStage,
     CompressionStage,
     ConstructionStage,
     OrderStage,
@@ -22,25 +20,17 @@ from o3d_relief.records import (
 )
 from o3d_relief.show.annotate import annotate
 from o3d_relief.show.camera import view_direction
-from o3d_relief.show.colors import label_colors
-from o3d_relief.show.easel import Easel, Pictures
+from o3d_relief.show.easel import OBLIQUE, SIDE, STILL, Easel, Pictures
 from o3d_relief.show.render import render
+from o3d_relief.show.scene_panels import SCENE_PANELS
 
-__all__ = ["ACTIONS", "HIDDEN", "OBLIQUE", "PANELS", "SEEN"]
+__all__ = ["PANELS"]
 
 Vector = tuple[float, float, float]
 
 _FRONT: Vector = (0.0, 0.0, 1.0)
-OBLIQUE = view_direction(38.0, 12.0)
-"""From where most right panels are seen."""
 _NEAR_FRONT = view_direction(22.0, 10.0)
-_SIDE = view_direction(65.0, 8.0)
 _GAP = 4  # pixels
-_STILL = 1e-9
-"""Relief units up to which nothing has moved and nothing stands out: there is no scale for that."""
-
-SEEN, HIDDEN = (0.93, 0.78, 0.42), (0.33, 0.45, 0.62)
-ACTIONS = {"attach": (0.16, 0.47, 0.71), "scale": (0.93, 0.66, 0.16), "discard": (0.78, 0.17, 0.20)}
 
 
 def _bounds(*surfaces: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -74,103 +64,11 @@ def _pair(
     return [annotate(picture, title=title, legend=(), bar=None) for title in titles]
 
 
-def _scene(easel: Easel) -> Pictures:
-    record = easel.record(SceneStage)
-    mesh = easel.mesh(record.vertices)
-    title = f"scene: {len(record.vertices)} vertices, {len(record.faces)} faces"
-    return [
-        render(mesh, size=easel.size, title=title),
-        render(mesh, size=easel.size, direction=OBLIQUE, title="from the side"),
-    ]
-
-
 def _perspective(easel: Easel) -> Pictures:
     before, after = easel.record(SceneStage).vertices, easel.vertices
     changed = not np.array_equal(before, after)
     titles = ("before the forced perspective", "after" if changed else "after: no vanishing point, unchanged")
     return _pair(easel, (before, after), titles, direction=OBLIQUE)
-
-
-def _visibility(easel: Easel) -> Pictures:
-    visible = easel.record(VisibilityStage).visible
-    colors = np.where(visible[:, None], SEEN, HIDDEN)
-    count = int(visible.sum())
-    legend = [(SEEN, f"visible: {count}"), (HIDDEN, f"hidden: {len(visible) - count}")]
-    mesh = easel.mesh(easel.vertices)
-    return [
-        render(mesh, size=easel.size, colors=colors, sharp_colors=True, title="visibility", legend=legend),
-        render(
-            mesh,
-            size=easel.size,
-            direction=_SIDE,
-            colors=colors,
-            sharp_colors=True,
-            title="from the side",
-            legend=legend,
-        ),
-    ]
-
-
-def _clusters(easel: Easel) -> Pictures:
-    record = easel.record(ClustersStage)
-    colors = label_colors(record.labels, easel.record(SceneStage).faces)[record.labels]
-    mesh = easel.mesh(easel.vertices)
-    points = np.column_stack([record.centers, np.zeros(len(record.centers))])
-    title = f"clusters: {len(record.centers)}, with their centres"
-    front = render(
-        mesh,
-        size=easel.size,
-        colors=colors,
-        sharp_colors=True,
-        points=points,
-        point_colors=(0.97, 0.96, 0.94),
-        point_radius=_dot(easel, len(points)),
-        title=title,
-    )
-    side = render(
-        mesh, size=easel.size, direction=OBLIQUE, colors=colors, sharp_colors=True, title="from the side"
-    )
-    return [front, side]
-
-
-def _dot(easel: Easel, count: int) -> float:
-    """Return a radius at which so many points stay apart."""
-    return float(np.clip(0.08 * min(easel.size) / np.sqrt(max(count, 1)), 1.2, 0.0075 * min(easel.size)))
-
-
-def _attenuation(easel: Easel) -> Pictures:
-    record = easel.record(AttenuationStage)
-    mesh = easel.mesh(easel.vertices)
-    points = easel.vertices[record.index]
-    colors = np.array([ACTIONS[str(action)] for action in record.action]).reshape(-1, 3)
-    legend: list[tuple[ArrayLike, str]] = [
-        (color, f"{action}: {int(np.sum(record.action == action))}") for action, color in ACTIONS.items()
-    ]
-    radius = _dot(easel, len(points))
-    kept = record.action != "discard"
-    top = float(record.new_height[kept].max(initial=0.0))
-    old = float(record.height[kept].max(initial=0.0))
-    actions = render(
-        mesh,
-        size=easel.size,
-        points=points,
-        point_colors=colors,
-        point_radius=radius,
-        title="attenuation points by action",
-        legend=legend,
-    )
-    heights = render(
-        mesh,
-        size=easel.size,
-        points=points[kept],
-        point_field=record.new_height[kept] if top > _STILL else None,
-        point_colors=None if top > _STILL else ACTIONS["attach"],
-        point_radius=radius,
-        field_range=(0.0, top),
-        field_label="new height",
-        title=f"new heights: {f'up to {top:.1f}' if top > _STILL else 'all 0'}, before up to {old:.1f}",
-    )
-    return [actions, heights]
 
 
 def _construction(easel: Easel) -> Pictures:
@@ -191,11 +89,11 @@ def _restoration(easel: Easel) -> Pictures:
     error = render(
         easel.mesh(before),
         size=easel.size,
-        field=record.order_error if largest > _STILL else None,
+        field=record.order_error if largest > STILL else None,
         field_range=(0.0, largest),
         colormap="heat",
         field_label="order error",
-        title=f"{'' if largest > _STILL else 'no '}depth order errors, "
+        title=f"{'' if largest > STILL else 'no '}depth order errors, "
         f"{int(record.solved.sum())} vertices solved again",
     )
     worst = int(np.argmax(record.order_error * record.solved * easel.record(VisibilityStage).visible))
@@ -219,7 +117,7 @@ def _order(easel: Easel) -> Pictures:
     before, after = easel.raised(restored), easel.raised(record.z)
     moved = record.z - restored
     largest = float(np.abs(moved).max())
-    if largest <= _STILL:
+    if largest <= STILL:
         asked = bool(record.counts)  # of an order that was looked at
         titles = (
             "before",
@@ -251,7 +149,7 @@ def _compression(easel: Easel) -> Pictures:
         f"compression, before: depth {before[:, 2].max():.1f}",
         f"after: depth {record.z.max():.1f}",
     )
-    return _pair(easel, (before, after), titles, direction=_SIDE, plate=True)
+    return _pair(easel, (before, after), titles, direction=SIDE, plate=True)
 
 
 def _bounded(easel: Easel) -> Pictures:
@@ -271,7 +169,7 @@ def _bounded(easel: Easel) -> Pictures:
     )
     moved = record.z - easel.vertices[:, 2]
     after = easel.raised(np.maximum(record.z, 0.0))
-    still = np.ptp(moved) <= _STILL
+    still = np.ptp(moved) <= STILL
     title = f"bounded: depth {np.ptp(easel.vertices[:, 2]):.1f} before, {record.z.max():.1f} after"
     result = render(
         easel.mesh(after),
@@ -297,11 +195,11 @@ def _trim(easel: Easel) -> Pictures:
 
 
 PANELS: Mapping[str, Callable[[Easel], Pictures]] = {
-    "scene": _scene,
+    "scene": SCENE_PANELS["scene"],
     "perspective": _perspective,
-    "visibility": _visibility,
-    "clusters": _clusters,
-    "attenuation": _attenuation,
+    "visibility": SCENE_PANELS["visibility"],
+    "clusters": SCENE_PANELS["clusters"],
+    "attenuation": SCENE_PANELS["attenuation"],
     "construction": _construction,
     "restoration": _restoration,
     "order": _order,

@@ -6,7 +6,6 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +18,7 @@ from o3d_relief.errors import Cancelled, ReliefError
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.records import final_heights
 from o3d_relief.scene.write import write_mesh
+from o3d_relief.show.agenda import Act, Agenda, Request
 from o3d_relief.show.sight import Sight, Work
 
 if TYPE_CHECKING:
@@ -26,23 +26,10 @@ if TYPE_CHECKING:
 
     from o3d_relief.relief import Relief
 
-__all__ = ["Act", "Studio"]
-
-Act = Callable[[ReliefEditor, bool], object]
-"""Changes the editor; the second argument says whether the same change goes on, as of a slider."""
+__all__ = ["Studio"]
 
 _GOES_ON = 1.5  # seconds between two values of one slider that count as one change
 _OPENING = "the responses of the surface"
-_FINISH = "finish"
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Request:
-    name: str
-    act: Act
-    doing: str
-    due: float
-    changes: bool
 
 
 class Studio:
@@ -75,16 +62,11 @@ class Studio:
         self.work = Work(doing=_OPENING)
         self._first = mesh, params, view
         self._on_news: Callable[[], None] | None = on_news
-        self._rest, self._finishing = rest, finishing
-        self._change = threading.Condition()
-        self._requests: list[_Request] = []
-        self._now: _Request | None = None
+        self._agenda = Agenda(self._finish, rest=rest, finishing=finishing)
         self._last = ("", 0.0)
         self._number = count()
-        self._called_off = self._closed = False
         self._relief: Relief | None = None
         self._editor: ReliefEditor | None = None
-        self._unfinished = False
         self._thread = threading.Thread(target=self._live, daemon=True)
         self._thread.start()
 
@@ -104,10 +86,8 @@ class Studio:
         changes : bool
             Whether the relief is another one afterwards.
         """
-        request = _Request(name=name, act=act, doing=doing, due=time.monotonic() + delay, changes=changes)
-        with self._change:
-            self._requests = [other for other in self._requests if other.name != name] + [request]
-            self._change.notify_all()
+        due = time.monotonic() + delay
+        self._agenda.ask(Request(name=name, act=act, doing=doing, due=due, changes=changes))
 
     def change(self, name: str, *, slow: bool = False, **values: Any) -> None:
         """Ask for other parameters, or another `view`.
@@ -157,18 +137,13 @@ class Studio:
 
     def finish(self, *, wanted: bool) -> None:
         """Say whether the relief is to be finished when the changes rest."""
-        with self._change:
-            self._finishing = wanted
-            if self._now is not None and self._now.name == _FINISH:
-                self._called_off = not wanted
-            self._change.notify_all()
+        self._agenda.finish(wanted=wanted)
         if not wanted:
             self.ask("preview", lambda _editor, _continued: None, changes=True)
 
     def cancel(self) -> None:
         """Call off what is being done; the preview stays until the next change."""
-        with self._change:
-            self._called_off = True
+        self._agenda.cancel()
 
     def close(self) -> tuple[ReliefParams, View] | None:
         """End all work and wait for its end.
@@ -178,10 +153,8 @@ class Studio:
         params, view
             The last ones; None where the editor could not be opened.
         """
-        with self._change:
-            self._closed = self._called_off = True
-            self._on_news = None
-            self._change.notify_all()
+        self._on_news = None
+        self._agenda.close()
         self._thread.join()
         return None if self._editor is None else (self._editor.params, self._editor.view)
 
@@ -194,61 +167,34 @@ class Studio:
         except (ReliefError, MemoryError) as error:
             self._tell(sentence=_sentence(error), failed=True)
             return
-        self._editor, self._unfinished = editor, True
+        self._editor, self._agenda.unfinished = editor, True
         self._show(editor)
         try:
-            while (request := self._next()) is not None:
+            while (request := self._agenda.next()) is not None:
                 self._carry_out(editor, request)
         except Exception as error:  # noqa: BLE001, the window must tell, it would wait for ever otherwise
             traceback.print_exc()
             self._tell(sentence=f"The editor broke: {error!r}. Nothing more can be changed.", failed=True)
 
-    def _next(self) -> _Request | None:
-        """Wait for a request; finish the relief where none has come for a while. None: the end."""
-        with self._change:
-            rested = time.monotonic() + self._rest
-            while not self._closed:
-                now = time.monotonic()
-                due = [request for request in self._requests if request.due <= now]
-                if due:
-                    self._requests.remove(due[0])
-                    return self._taken(due[0])
-                if self._requests:
-                    self._change.wait(min(request.due for request in self._requests) - now)
-                elif self._finishing and self._unfinished and now < rested:
-                    self._change.wait(rested - now)
-                elif self._finishing and self._unfinished:
-                    self._unfinished = False
-                    finish = _Request(name=_FINISH, act=self._finish, doing="", due=now, changes=False)
-                    return self._taken(finish)
-                else:
-                    self._change.wait()
-        return None
-
-    def _taken(self, request: _Request) -> _Request:
-        self._now, self._called_off = request, False
-        return request
-
-    def _carry_out(self, editor: ReliefEditor, request: _Request) -> None:
+    def _carry_out(self, editor: ReliefEditor, request: Request) -> None:
         name, when = self._last
         continued = name == request.name and time.monotonic() - when < _GOES_ON
         self._tell(doing=request.doing)
         try:
             request.act(editor, continued)
         except Cancelled:
-            self._tell(sentence="called off" if self._called_off else None)
+            self._tell(sentence="called off" if self._agenda.called_off else None)
             return
         except (ReliefError, MemoryError) as error:
             self._tell(sentence=_sentence(error), wrong=True)
             return
         finally:
-            with self._change:
-                self._now = None
+            self._agenda.done()
         if not request.changes:
             self._tell()
             return
         self._last = request.name, time.monotonic()
-        self._relief, self._unfinished = None, True
+        self._relief, self._agenda.unfinished = None, True
         self._show(editor, sentence="")
 
     def _finish(self, editor: ReliefEditor, _continued: bool) -> None:
@@ -268,25 +214,17 @@ class Studio:
     def _watch_change(self, stage: str, share: float | None) -> bool:
         """Tell how far a change is; call it off where asked to, or where a newer one makes it void."""
         if self._editor is None:  # the beginning, without which there is nothing
-            if not self._closed:
+            if not self._agenda.closed:
                 self._tell(doing=stage, share=share)
-            return not self._closed
-        with self._change:
-            now = self._now
-            void = now is not None and any(request.name == now.name for request in self._requests)
-        if void or self._called_off:
+            return not self._agenda.closed
+        if self._agenda.change_is_void():
             return False
         self._tell(doing=stage, share=share)
         return True
 
     def _watch(self, stage: str, share: float | None) -> bool:
         """Tell how far the relief is; call it off where a change waits, but not while it is to be saved."""
-        now = time.monotonic()
-        with self._change:
-            finishing = self._now is not None and self._now.name == _FINISH
-            waiting = any(request.due <= now and request.changes for request in self._requests)
-        if (waiting and finishing) or self._called_off:
-            self._unfinished = waiting
+        if self._agenda.relief_is_void():
             return False
         self._tell(doing=stage, share=share)
         return True
@@ -314,16 +252,14 @@ class Studio:
         if sentence is None:
             sentence, wrong = self.work.sentence, self.work.wrong
         self.work = Work(doing=doing, share=share, sentence=sentence, wrong=wrong or failed, failed=failed)
-        with self._change:
-            news = self._on_news
+        news = self._on_news
         if news is not None:
             news()
 
     @property
     def waiting(self) -> bool:
         """Whether a request has not been carried out yet."""
-        with self._change:
-            return bool(self._requests)
+        return self._agenda.waiting
 
 
 def _sentence(error: BaseException) -> str:

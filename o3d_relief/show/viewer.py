@@ -10,7 +10,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
-from o3d_relief.errors import DisplayError, ParameterError
+from o3d_relief.errors import DisplayError
+from o3d_relief.param_checks import given
 from o3d_relief.params import View
 from o3d_relief.records import StageRecord
 from o3d_relief.relief import Relief
@@ -60,9 +61,7 @@ class StageViewer:
         title: str = "o3d-relief",
         size: tuple[int, int] = (1200, 900),
     ) -> None:
-        view = View() if view is None else view
-        if not isinstance(view, View):
-            raise ParameterError(f"view must be a View. Got {view!r} instead.")
+        view = given("view", view, View)
         require_display()
         home = str(Path(__file__).parents[2])
         search = os.pathsep.join(filter(None, [home, os.environ.get("PYTHONPATH", "")]))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from o3d_relief.records import AttenuationStage
 from o3d_relief.show.annotate import write
 from o3d_relief.show.live_mesh import DIMMED
-from o3d_relief.show.stage_panels import ACTIONS
+from o3d_relief.show.scene_panels import ACTIONS
 
 __all__ = ["Caption", "plane_outline", "point_balls", "point_lines", "wireframe"]
 

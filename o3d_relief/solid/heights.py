@@ -1,4 +1,4 @@
-"""The upper envelope of a solid, seen from the front, and the solid under it: no undercuts."""
+"""The upper envelope of a solid, seen from the front."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
 
 from o3d_relief.errors import ParameterError
 from o3d_relief.rays import unit_box
 from o3d_relief.solid.body import PLATE_COLOR, Solid
-from o3d_relief.solid.plate import as_plate
 
-__all__ = ["HeightField", "check_pixels", "height_field", "solid_under"]
+__all__ = ["HeightField", "check_pixels", "height_field"]
 
 _MOST_PIXELS = 40_000_000
 """Of a height field: about 8 GB of memory."""
 _RAYS_AT_ONCE = 2_000_000
+_BESIDE = ((1e-6, 1e-6), (-1e-6, 1e-6), (-1e-6, -1e-6), (1e-6, -1e-6))
+"""Where a ray that has slipped through is cast again, as shares of the solid's size."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -177,94 +177,37 @@ def _first_hits(
     y: NDArray[np.float64],
     above: float,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return the face that each ray meets first (rows, columns), -1 for none, and the corners' weights."""
+    """Return the face that each ray meets first (rows, columns), -1 for none, and the corners' weights.
+
+    A ray right at a vertex may slip between the faces there. It then meets a face from inside the solid, and
+    is cast again a hair beside.
+    """
     rays = np.zeros((len(y), len(x), 6), dtype=np.float32)
     rays[..., 0] = (x - center[0]) / size
     rays[..., 1] = ((y - center[1]) / size)[:, None]
     rays[..., 2] = (above - center[2]) / size + 0.1
     rays[..., 5] = -1.0
+    face, weights, slipped = _cast(scene, rays)
+    for sideways in _BESIDE:
+        if not slipped.any():
+            break
+        again = rays[slipped]
+        again[:, :2] += np.array(sideways, dtype=np.float32)
+        found, shares, inside = _cast(scene, again)
+        good = (found >= 0) & ~inside
+        mended = tuple(axis[good] for axis in np.nonzero(slipped))
+        face[mended], weights[mended], slipped[mended] = found[good], shares[good], False
+    return face, weights
+
+
+def _cast(
+    scene: o3d.t.geometry.RaycastingScene, rays: NDArray[np.float32]
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]]:
+    """Return the face that each ray meets first, the weights of its corners, and whether from inside."""
     answer = scene.cast_rays(o3d.core.Tensor(rays))
     identity = answer["primitive_ids"].numpy()
     face = np.where(identity == scene.INVALID_ID, -1, identity.astype(np.int64))
     uv = np.clip(answer["primitive_uvs"].numpy().astype(np.float64), 0.0, 1.0)
     first = np.clip(1.0 - uv.sum(axis=-1, keepdims=True), 0.0, 1.0)
-    return face, np.concatenate([first, uv], axis=-1)
-
-
-def solid_under(field: HeightField, solid: Solid) -> Solid:
-    """Return the solid between a height field and the back, with the outline of another solid.
-
-    Parameters
-    ----------
-    field : HeightField
-    solid : Solid
-        The one that the field was taken of: its outline, seen from the front, is cut out exactly, so that
-        the size does not depend on the pixels. Its back becomes flat, without pockets.
-
-    Returns
-    -------
-    Solid
-        Every line along z meets it once.
-    """
-    import manifold3d
-
-    thickness = float(np.nanmax(field.z)) - field.back + 1.0
-    shadow = solid.to_manifold().project().to_polygons()  # polygons that overlap
-    outline = manifold3d.CrossSection(shadow, manifold3d.FillRule.Positive)
-    prism = as_plate(outline.extrude(thickness).translate((0.0, 0.0, field.back)))
-    made = _block(field).to_manifold() ^ prism
-    if field.colors is None:
-        # What is flat to a hundredth of a pixel needs no triangles; colours would be lost with them.
-        made = made.simplify(0.01 * field.mm_per_pixel)
-    return Solid.from_manifold(made, colored=field.colors is not None)
-
-
-def _block(field: HeightField) -> Solid:
-    """Close the field to a block that is a pixel wider on each side and reaches below the back.
-
-    Beside the piece it has the height of the nearest pixel.
-    """
-    nearest = distance_transform_edt(~field.inside, return_distances=False, return_indices=True)
-    spread = np.pad(np.ravel_multi_index(tuple(nearest), field.z.shape), 1, mode="edge").ravel()
-    rows, columns = field.z.shape[0] + 2, field.z.shape[1] + 2
-    x = field.left + (np.arange(columns) - 0.5) * field.mm_per_pixel
-    y = field.top - (np.arange(rows) - 0.5) * field.mm_per_pixel
-    z = field.z.ravel()[spread]
-    surface = np.stack([np.tile(x, rows), np.repeat(y, columns), z], axis=1)
-
-    number = np.arange(rows * columns).reshape(rows, columns)
-    a, b = number[:-1, :-1].ravel(), number[1:, :-1].ravel()
-    c, d = number[1:, 1:].ravel(), number[:-1, 1:].ravel()
-    along = (np.abs(z[a] - z[c]) <= np.abs(z[b] - z[d]))[:, None]  # the flatter diagonal follows an edge
-    top = np.concatenate(
-        [
-            np.where(along, np.stack([a, b, c], 1), np.stack([a, b, d], 1)),
-            np.where(along, np.stack([a, c, d], 1), np.stack([b, c, d], 1)),
-        ]
-    )
-    # Counterclockwise seen from the front, as the top is.
-    ring = np.concatenate([number[:-1, 0], number[-1, :-1], number[:0:-1, -1], number[0, :0:-1]])
-    below = len(surface) + np.arange(len(ring))
-    after, below_after = np.roll(ring, -1), np.roll(below, -1)
-    center = np.full(len(ring), len(surface) + len(ring))
-    sides = np.concatenate(
-        [
-            np.stack([ring, below, below_after], 1),
-            np.stack([ring, below_after, after], 1),
-            np.stack([below, center, below_after], 1),
-        ]
-    )
-    low = field.back - 1.0
-    floor = np.column_stack([surface[ring, :2], np.full(len(ring), low)])
-    middle = [[(x[0] + x[-1]) / 2, (y[0] + y[-1]) / 2, low]]
-    own = ~field.is_plate.ravel()[spread]
-    colors = None
-    if field.colors is not None:
-        plain = np.tile(np.array(PLATE_COLOR), (len(ring) + 1, 1))
-        colors = np.concatenate([field.colors.reshape(-1, 3)[spread], plain])
-    return Solid(
-        vertices=np.concatenate([surface, floor, middle]),
-        faces=np.concatenate([top, sides]),
-        colors=colors,
-        is_plate=np.concatenate([~own[top].any(axis=1), np.ones(len(sides), dtype=bool)]),
-    )
+    inside = (face >= 0) & (answer["primitive_normals"].numpy()[..., 2] < 0.0)
+    return face, np.concatenate([first, uv], axis=-1), inside

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o3d_relief.errors import MeshError, ParameterError
+from o3d_relief.param_checks import given
 from o3d_relief.plate_params import PlateParams
 from o3d_relief.progress import OnProgress, Progress, Tick, silent
 from o3d_relief.relief import Relief
@@ -86,9 +87,7 @@ def make_solid(
     >>> make_solid(relief, PlateParams(width_mm=80, depth_mm=20)).size[[0, 2]].round(3).tolist()
     [80.0, 20.0]
     """
-    params = PlateParams() if params is None else params
-    if not isinstance(params, PlateParams):
-        raise ParameterError(f"params must be a PlateParams. Got {params!r} instead.")
+    params = given("params", params, PlateParams)
     if not isinstance(relief, Relief):
         kind = f"{type(relief).__module__}.{type(relief).__qualname__}"
         raise ParameterError(f"relief must be a Relief, as make_relief returns. Got a {kind} instead.")

@@ -104,13 +104,7 @@ def make_tiles(solid: Solid, params: TileParams) -> Tiling:
     """
     low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
     pins = chosen_pins(float(low[2]), params)
-    columns = _count(high[0] - low[0], params.width_mm, pins.length)
-    rows = _count(high[1] - low[1], params.height_mm, pins.length)
-    if columns * rows > _MOST_TILES:
-        raise ParameterError(
-            f"The tiles must be larger: {params.width_mm:g} x {params.height_mm:g} mm makes "
-            f"{columns * rows} of them, more than {_MOST_TILES}."
-        )
+    columns, rows = _grid(high - low, params, pins.length)
     x, y = np.linspace(low[0], high[0], columns + 1), np.linspace(low[1], high[1], rows + 1)
     whole = solid.to_manifold()
     places = joints(whole, x, y, pins)
@@ -119,13 +113,7 @@ def make_tiles(solid: Solid, params: TileParams) -> Tiling:
             f"Pins of {2.0 * pins.radius:g} mm that stand out {pins.length:g} mm fit into none of the "
             "joints: make pin_mm smaller, or the base thicker."
         )
-    bodies = {}
-    for column in range(columns):
-        strip = whole ^ bar(low - 1.0, high + 1.0, 0, x[column : column + 2])
-        for row in range(rows):
-            body = strip ^ bar(low - 1.0, high + 1.0, 1, y[row : row + 2])
-            if not body.is_empty():
-                bodies[column, row] = body
+    bodies = _cut_apart(whole, low, high, x, y)
     room = (params.width_mm - pins.length, params.height_mm - pins.length)
     bodies, loose = held(bodies, float(low[2]), room)
     tiles = []
@@ -165,6 +153,43 @@ def make_tiles(solid: Solid, params: TileParams) -> Tiling:
     )
 
 
+def _grid(size: NDArray[np.float64], params: TileParams, length: float) -> tuple[int, int]:
+    """Return into how many columns and rows a size is cut, for pins of a length; refuse too many."""
+    columns = _count(size[0], params.width_mm, length)
+    rows = _count(size[1], params.height_mm, length)
+    if columns * rows > _MOST_TILES:
+        raise ParameterError(
+            f"The tiles must be larger: {params.width_mm:g} x {params.height_mm:g} mm makes "
+            f"{columns * rows} of them, more than {_MOST_TILES}."
+        )
+    return columns, rows
+
+
+def _count(extent: float, largest: float, length: float) -> int:
+    """Return into how many tiles of the largest size, their pins included, an extent is cut."""
+    if extent <= largest * (1.0 + 1e-9):
+        return 1
+    return math.ceil(extent / (largest - length) - 1e-9)
+
+
+def _cut_apart(
+    whole: manifold3d.Manifold,
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+) -> dict[tuple[int, int], manifold3d.Manifold]:
+    """Cut along x and y; return what is not empty by column and row, from the lower left."""
+    bodies = {}
+    for column in range(len(x) - 1):
+        strip = whole ^ bar(low - 1.0, high + 1.0, 0, x[column : column + 2])
+        for row in range(len(y) - 1):
+            body = strip ^ bar(low - 1.0, high + 1.0, 1, y[row : row + 2])
+            if not body.is_empty():
+                bodies[column, row] = body
+    return bodies
+
+
 def _cut_pockets(
     whole: manifold3d.Manifold, back: float, x: NDArray[np.float64], y: NDArray[np.float64]
 ) -> int:
@@ -188,13 +213,6 @@ def _enclosed(area: manifold3d.CrossSection) -> manifold3d.CrossSection:
 
     outlines = [ring for ring in area.to_polygons() if manifold3d.CrossSection([ring]).area() > 0.0]
     return manifold3d.CrossSection(outlines, manifold3d.FillRule.Positive) - area
-
-
-def _count(extent: float, largest: float, length: float) -> int:
-    """Return into how many tiles of the largest size, their pins included, an extent is cut."""
-    if extent <= largest * (1.0 + 1e-9):
-        return 1
-    return math.ceil(extent / (largest - length) - 1e-9)
 
 
 def _bolts(

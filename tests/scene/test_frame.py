@@ -72,3 +72,8 @@ def test_edge_on_from_any_side(seed, scale):
 def test_flat_scene_from_the_front_is_fine():
     flat = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0.0]])
     assert relief_frame(flat).unit == pytest.approx(0.01)
+
+
+def test_a_small_piece_far_from_the_origin_is_no_line():
+    flat = 1e-3 * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0.0]])
+    assert relief_frame(flat + np.array([5e5, 5e6, 100.0])).unit == pytest.approx(1e-5, rel=1e-3)

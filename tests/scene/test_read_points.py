@@ -142,6 +142,20 @@ class TestLists:
         assert np.array_equal(arrays.normals, NORMALS)
         np.testing.assert_allclose(arrays.colors, COLORS / 255)
 
+    def test_intensity_normal_and_colour_at_once(self, tmp_path):
+        grey = np.arange(len(POINTS), dtype=float)[:, None]
+        arrays = read_arrays(save(tmp_path / "a.pts", text(POINTS, grey, NORMALS, COLORS)))
+        plain = read_arrays(save(tmp_path / "b.pts", text(POINTS, NORMALS, COLORS)))
+        for name in ("points", "normals", "colors"):
+            np.testing.assert_array_equal(getattr(arrays, name), getattr(plain, name))
+
+    def test_columns_behind_the_colour_are_left_out(self, tmp_path):
+        more = np.tile([7.0, 9.0], (len(POINTS), 1))
+        arrays = read_arrays(save(tmp_path / "a.xyz", text(POINTS, COLORS, more)))
+        plain = read_arrays(save(tmp_path / "b.xyz", text(POINTS, COLORS)))
+        np.testing.assert_array_equal(arrays.points, POINTS)
+        np.testing.assert_array_equal(arrays.colors, plain.colors)
+
     def test_pts_with_count_and_intensity(self, tmp_path):
         body = "70\n" + text(POINTS, RANDOM.integers(-2000, 2000, 70), COLORS)
         arrays = read_arrays(save(tmp_path / "a.pts", body))

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from o3d_relief.scene.weld import SEAM, same_places, weld
+from o3d_relief.scene.weld import SEAM, first_of_equal_rows, same_places, weld
 from shapes import bust, exploded, grid, joined, moved
 
 
@@ -78,3 +78,16 @@ def test_fine_closed_surfaces_are_not_touched():
 def test_nothing():
     assert len(weld(np.zeros((3, 3)), np.array([[0, 1, 2]])).faces) == 0
     assert same_places(np.zeros((0, 3)), np.zeros((0, 3), dtype=int)).shape == (0,)
+
+
+@pytest.mark.parametrize("columns", [1, 2, 3])
+@pytest.mark.parametrize("kind", [np.float64, np.int64])
+def test_equal_rows_are_found_as_by_comparing_all_of_them(columns, kind):
+    generator = np.random.default_rng(columns)
+    for count in (1, 2, 7, 40):
+        for values in (1, 2, 5, 1000):
+            rows = generator.integers(-values, values + 1, size=(count, columns)).astype(kind)
+            if kind is np.float64:
+                rows[::2] *= -1.0  # makes some of the zeros -0.0, which equals 0.0
+            equal = (rows[:, None] == rows[None]).all(axis=2)
+            np.testing.assert_array_equal(first_of_equal_rows(rows), equal.argmax(axis=1))

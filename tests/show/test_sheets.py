@@ -2,93 +2,16 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import open3d as o3d
 import pytest
 from PIL import Image
 
 from o3d_relief.errors import FileError, ParameterError
-from o3d_relief.params import ReliefParams
-from o3d_relief.pipeline import make_relief
-from o3d_relief.records import (
-    AttenuationStage,
-    BoundedStage,
-    ClustersStage,
-    CompressionStage,
-    ConstructionStage,
-    OrderStage,
-    PerspectiveStage,
-    RestorationStage,
-    SceneStage,
-    TrimStage,
-    VisibilityStage,
-)
-from o3d_relief.show import stage_panels
-from o3d_relief.show.render import render
 from o3d_relief.show.sheets import contact_sheet, save_stage_pictures, stage_picture, view_sheet
+from stage_records import make_sphere, make_stages
 
-NAMES = [
-    "scene",
-    "perspective",
-    "visibility",
-    "clusters",
-    "attenuation",
-    "construction",
-    "restoration",
-    "order",
-    "compression",
-    "trim",
-]
 SIZE = (168, 80)
-
-
-def make_sphere(depth=1.0):
-    """Return a ball of diameter 100, flattened in depth, that stands on z = 0."""
-    sphere = o3d.geometry.TriangleMesh.create_sphere(50.0, 10)
-    vertices = np.asarray(sphere.vertices) * [1.0, 1.0, depth]
-    vertices[:, 2] -= vertices[:, 2].min()
-    return vertices, np.asarray(sphere.triangles).astype(np.int64)
-
-
-def make_stages():
-    vertices, faces = make_sphere()
-    n = len(vertices)
-    z = 0.5 * vertices[:, 2]
-    labels = (vertices[:, 0] > 0).astype(np.int64) + 2 * (vertices[:, 1] > 0)
-    index = np.array([0, 20, 40, 60])
-    action = np.array(["attach", "scale", "discard", "scale"])
-    error = np.zeros(n)
-    error[np.argmax(vertices[:, 2])] = 0.8
-    records = [
-        SceneStage(
-            vertices=vertices.copy(),
-            faces=faces,
-            welded_index=np.arange(n),
-            welded_face=np.arange(len(faces)),
-            unit=1.0,
-        ),
-        PerspectiveStage(vertices=vertices * [0.8, 0.8, 1.0]),
-        VisibilityStage(visible=vertices[:, 2] > 50.0),
-        ClustersStage(labels=labels, centers=np.array([[-25.0, -25], [25, -25], [-25, 25], [25, 25]])),
-        AttenuationStage(
-            index=index,
-            cluster=np.arange(4),
-            height=vertices[index, 2],
-            differential=np.full(4, 0.5),
-            rho=np.full(4, 0.5),
-            beta=np.full(4, 0.2),
-            action=action,
-            new_height=np.where(action == "discard", np.nan, 0.5 * vertices[index, 2]),
-        ),
-        ConstructionStage(z=z - 3.0),
-        RestorationStage(order_error=error, solved=error > 0.2, z=z),
-        OrderStage(z=z + 2.0 * (labels == 0), counts={"pairs_corrected": 7}),
-        CompressionStage(alpha=np.full(n, 0.5), z=0.5 * z),
-        TrimStage(),
-    ]
-    return {record.name: record for record in records}
 
 
 @pytest.fixture(scope="module")
@@ -165,102 +88,9 @@ def test_a_view_sheet_shows_both_rows_at_one_scale():
 # --- stage pictures ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_every_stage_has_a_picture_of_two_panels(stages, name):
-    image = stage_picture(name, stages, size=SIZE)
-    assert image.shape == (80, 168, 3)
-    assert image.dtype == np.uint8
-    for panel in (image[:, :80], image[:, 88:]):
-        drawn = np.abs(panel.astype(int) - (222, 222, 221)).max(axis=2) > 30
-        assert 0.1 < drawn.mean() < 0.95
-
-
-@pytest.mark.parametrize("name", NAMES[:-1])
-def test_a_picture_needs_no_later_stage(stages, name):
-    so_far = {key: stages[key] for key in NAMES[: NAMES.index(name) + 1]}
-    assert np.array_equal(stage_picture(name, so_far, size=SIZE), stage_picture(name, stages, size=SIZE))
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_a_missing_record_is_named(name):
-    with pytest.raises(ParameterError, match="has no record"):
-        stage_picture(name, {}, size=SIZE)
-
-
-def test_bounded_mode_has_a_picture_of_its_own(stages):
-    scene, perspective = stages["scene"], stages["perspective"]
-    z = 0.3 * perspective.vertices[:, 2]
-    record = BoundedStage(face_weight=np.linspace(0.1, 1.0, len(scene.faces)), attached=np.array([3]), z=z)
-    run = {"scene": scene, "perspective": perspective, "visibility": stages["visibility"], "bounded": record}
-    assert stage_picture("bounded", run, size=SIZE).shape == (80, 168, 3)
-    assert stage_picture("trim", {**run, "trim": stages["trim"]}, size=SIZE).shape == (80, 168, 3)
-    with pytest.raises(ParameterError, match="has no record"):
-        stage_picture("bounded", {}, size=SIZE)
-
-
 def test_an_unknown_stage_raises(stages):
     with pytest.raises(ParameterError, match=r"name must be one of points, .*Got 'carving' instead"):
         stage_picture("carving", stages, size=SIZE)
-
-
-def test_visible_and_hidden_have_two_colors(stages):
-    image = stage_picture("visibility", stages, size=(408, 200)).astype(int)
-    warm = image[..., 0] > 1.3 * image[..., 2]
-    cold = image[..., 2] > 1.3 * image[..., 0]
-    front, side = slice(0, 200), slice(208, 408)
-    surface = slice(20, 170)  # without the legend
-    assert warm[surface, front].sum() > 20 * max(cold[surface, front].sum(), 1)
-    assert warm[surface, side].sum() > 1000
-    assert cold[surface, side].sum() > 1000
-
-
-def test_the_perspective_shows_a_change_and_says_where_there_is_none(stages):
-    changed = stage_picture("perspective", stages, size=SIZE)
-    assert not np.array_equal(changed[20:, :80], changed[20:, 88:])
-    same = {**stages, "perspective": PerspectiveStage(vertices=stages["scene"].vertices.copy())}
-    unchanged = stage_picture("perspective", same, size=SIZE)
-    assert np.array_equal(unchanged[20:, :80], unchanged[20:, 88:])
-
-
-def test_the_order_error_is_hot_where_it_is(stages):
-    image = stage_picture("restoration", stages, size=(408, 200)).astype(int)
-    left = image[20:, :140]
-    hot = left[..., 0] > 1.8 * left[..., 2]
-    assert hot.sum() > 20
-    without = {
-        **stages,
-        "restoration": RestorationStage(
-            order_error=np.zeros(len(stages["scene"].vertices)),
-            solved=np.zeros(len(stages["scene"].vertices), dtype=bool),
-            z=stages["restoration"].z.copy(),
-        ),
-    }
-    left = stage_picture("restoration", without, size=(408, 200)).astype(int)[20:, :140]
-    assert not np.any(left[..., 0] > 1.8 * left[..., 2])
-
-
-def test_no_attenuation_point_is_drawn_without_one(stages):
-    empty = np.zeros(0)
-    none = AttenuationStage(
-        index=np.zeros(0, dtype=np.int64),
-        cluster=np.zeros(0, dtype=np.int64),
-        height=empty.copy(),
-        differential=empty.copy(),
-        rho=empty.copy(),
-        beta=empty.copy(),
-        action=np.zeros(0, dtype=np.str_),
-        new_height=empty.copy(),
-    )
-    with_points = stage_picture("attenuation", stages, size=SIZE)
-    without = stage_picture("attenuation", {**stages, "attenuation": none}, size=SIZE)
-    assert without.shape == with_points.shape
-    assert not np.array_equal(without, with_points)
-
-
-def test_the_trimmed_relief_is_drawn_where_it_is_given(stages):
-    box = o3d.geometry.TriangleMesh.create_box(10, 10, 3)
-    given = stage_picture("trim", stages, relief=box, size=SIZE)
-    assert not np.array_equal(given, stage_picture("trim", stages, size=SIZE))
 
 
 def test_the_records_stay_as_they_are(stages):
@@ -284,69 +114,3 @@ def test_saving_into_a_missing_folder_raises(stages, tmp_path):
     with pytest.raises(FileError, match="does not exist"):
         save_stage_pictures(stages, tmp_path / "nowhere", size=SIZE)
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.fixture
-def drawn(monkeypatch):
-    """Return the options of each render, as they come."""
-    options = []
-    monkeypatch.setattr(stage_panels, "render", lambda *a, **o: options.append(o) or render(*a, **o))
-    return options
-
-
-@pytest.mark.parametrize("name", ["perspective", "order", "compression"])
-def test_what_is_the_same_before_and_after_is_drawn_once(stages, drawn, name):
-    z = stages["restoration"].z
-    same = {
-        **stages,
-        "perspective": PerspectiveStage(vertices=stages["scene"].vertices.copy()),
-        "order": OrderStage(z=z.copy()),
-        "compression": CompressionStage(alpha=np.ones(len(z)), z=z.copy()),
-    }
-    image = stage_picture(name, same, size=(408, 200))
-    assert len(drawn) == 1
-    assert np.array_equal(image[30:, :200], image[30:, 208:])  # below the titles
-    assert not np.array_equal(image[:30, :200], image[:30, 208:])
-    stage_picture(name, stages, size=SIZE)
-    assert len(drawn) == 3
-
-
-def test_an_order_that_was_not_asked_for_is_not_said_to_be_kept(stages, monkeypatch):
-    titles = []
-    told = stage_panels.annotate
-    monkeypatch.setattr(stage_panels, "annotate", lambda *a, **o: titles.append(o["title"]) or told(*a, **o))
-    ball = o3d.geometry.TriangleMesh.create_sphere(50.0, 6)
-    for params, sentence in (
-        (ReliefParams.paper(k=4), "order not asked for: unchanged"),
-        (ReliefParams(k=4), "in order: nothing had to be moved"),
-    ):
-        stage_picture("order", make_relief(ball, params).stages, size=SIZE)
-        assert titles[-2:] == ["before", sentence]
-
-
-@pytest.mark.parametrize(
-    ("name", "field", "title"),
-    [
-        ("attenuation", "point_field", "new heights: all 0, "),
-        ("restoration", "field", "no depth order errors"),
-        ("bounded", "field", ", shape unchanged"),
-    ],
-)
-def test_no_scale_where_nothing_stands_out(stages, drawn, name, field, title):
-    z, n = stages["perspective"].vertices[:, 2], len(stages["scene"].vertices)
-    weight = np.ones(len(stages["scene"].faces))
-    bounded = BoundedStage(face_weight=weight, attached=np.array([3]), z=0.3 * z)
-    restored = stages["restoration"]
-    moving = {**stages, "bounded": bounded}
-    still = {
-        "attenuation": dataclasses.replace(stages["attenuation"], new_height=np.zeros(4)),
-        "restoration": dataclasses.replace(restored, order_error=np.zeros(n), solved=np.zeros(n, dtype=bool)),
-        "bounded": dataclasses.replace(bounded, z=z - 2.0),
-    }
-    for record, moves in ((moving[name], True), (still[name], False)):
-        drawn.clear()
-        stage_picture(name, {**stages, name: record}, size=SIZE)
-        labels = ("new height", "order error", "moved")
-        panel = next(options for options in drawn if options.get("field_label") in labels)
-        assert (panel[field] is not None) == moves
-        assert (title in panel["title"]) != moves

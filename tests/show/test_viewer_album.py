@@ -8,7 +8,7 @@ from o3d_relief.params import ReliefParams
 from o3d_relief.pipeline import make_relief
 from o3d_relief.show.mesh_colors import vertex_colors
 from o3d_relief.show.paint import PLASTER
-from o3d_relief.show.stage_panels import ACTIONS, HIDDEN, SEEN
+from o3d_relief.show.scene_panels import ACTIONS, HIDDEN, SEEN
 from o3d_relief.show.stage_surfaces import CutRelief
 from o3d_relief.show.viewer_album import INPUT_COLORS, Album
 from o3d_relief.show.viewer_state import ViewerState

@@ -1,7 +1,7 @@
 import numpy as np
 
 from o3d_relief.records import AttenuationStage
-from o3d_relief.show.stage_panels import ACTIONS
+from o3d_relief.show.scene_panels import ACTIONS
 from o3d_relief.show.viewer_marks import Caption, plane_outline, point_balls, point_lines, wireframe
 from shapes import bust
 

@@ -1,10 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
 
 from o3d_relief.errors import ParameterError
 from o3d_relief.solid.body import PLATE_COLOR, Solid
-from o3d_relief.solid.heights import HeightField, check_pixels, height_field, solid_under
+from o3d_relief.solid.heights import HeightField, check_pixels, height_field
 from shapes import bust
 from slabs import ball_on_slab, plain, plate, slab
 
@@ -32,6 +34,24 @@ def test_pixels_cover_the_piece_whatever_their_size():
     assert field.inside.all()
     assert field.left == pytest.approx(-86 * 0.35)
     assert field.top == pytest.approx(58 * 0.35)
+
+
+def test_field_moves_with_the_piece():
+    solid, way = ball_on_slab(colored=True), np.array([7.0, -30.0, 2.5])
+    field, moved = (
+        height_field(replace(solid, vertices=solid.vertices + by), 0.5) for by in (0.0 * way, way)
+    )
+    np.testing.assert_allclose(moved.z, field.z + 2.5, atol=1e-4)
+    np.testing.assert_allclose(moved.colors, field.colors, atol=1e-4)
+    assert (moved.left, moved.top) == (field.left + 7.0, field.top - 30.0)
+    assert (moved.back, moved.highest) == (-1.5, field.highest + 2.5)
+
+
+def test_no_face_is_looked_through():
+    solid = slab()
+    for first in range(len(solid.faces)):
+        faces, is_plate = np.roll(solid.faces, first, axis=0), np.roll(solid.is_plate, first)
+        assert height_field(replace(solid, faces=faces, is_plate=is_plate), 2.0).inside.all()
 
 
 def test_pixels_beside_the_piece_are_empty():
@@ -82,42 +102,6 @@ def plain_of(vertices, faces):
     from o3d_relief.solid.body import manifold_of
 
     return manifold_of(vertices, faces, is_plate=False)
-
-
-@pytest.mark.parametrize("colored", [False, True])
-def test_solid_under_a_field_has_no_undercut(colored):
-    solid = ball_on_slab(colored=colored)
-    made = solid_under(height_field(solid, 0.5), solid)
-    np.testing.assert_allclose(made.size[:2], solid.size[:2], atol=1e-6)
-    assert made.vertices[:, 2].min() == -4.0
-    assert made.size[2] == pytest.approx(solid.size[2], abs=0.02)
-    assert trimesh.Trimesh(made.vertices, made.faces, process=False).is_watertight
-    normals = np.cross(
-        made.vertices[made.faces[:, 1]] - made.vertices[made.faces[:, 0]],
-        made.vertices[made.faces[:, 2]] - made.vertices[made.faces[:, 0]],
-    )
-    down = normals[:, 2] < -1e-9
-    assert (made.vertices[made.faces[down]][..., 2] == -4.0).all()  # only the back faces away
-    # The shadow of the ball is filled: a cylinder below its upper half.
-    disc = np.pi * 10.0**2
-    wanted = 60 * 40 * 4 + 8 * disc + 2 / 3 * disc * 10
-    assert made.volume == pytest.approx(wanted, rel=3e-3)
-    assert (made.colors is not None) == colored
-
-
-def test_field_of_the_solid_under_a_field_is_the_field():
-    solid = ball_on_slab()
-    field = height_field(solid, 0.5)
-    again = height_field(solid_under(field, solid), 0.5)
-    assert again.z.shape == field.z.shape
-    assert np.abs(again.z - field.z).max() < 0.01  # flat to a hundredth of a pixel, 0.005
-
-
-def test_outline_is_cut_exactly():
-    corner = Solid.from_manifold(plate().trim_by_plane([-1.0, -1.0, 0.0], -10.0), colored=False)
-    made = solid_under(height_field(corner, 1.0), corner)
-    assert made.volume == pytest.approx(corner.volume, rel=1e-6)
-    np.testing.assert_allclose(made.size, corner.size, atol=1e-6)
 
 
 def test_with_heights_keeps_everything_else():

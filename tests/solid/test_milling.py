@@ -151,6 +151,15 @@ def test_a_tip_that_is_lost_is_not_made_up_for():
     assert made.z.max() == pytest.approx(2.0, abs=1e-9)
 
 
+@pytest.mark.parametrize(("highest", "wanted"), [(2.19, 2.19), (2.21, 2.0), (1.9, 2.0)])
+def test_depth_is_made_up_for_by_a_tenth_at_most(highest, wanted):
+    field = height_field(slab(), 0.5)
+    z = np.full((80, 120), -1.0)
+    z[40, 60], z[20, 20] = 2.0, 1.0
+    made = milled(replace(field.with_heights(z), highest=highest), MillParams(mm_per_pixel=0.5)).z
+    np.testing.assert_allclose(made, np.where(z > 0.0, z * wanted / 2.0, z), atol=1e-12)
+
+
 def test_ridges_are_kept_on_request():
     field = height_field(slab(), 0.5)
     z = np.array(field.z)
