@@ -15,7 +15,9 @@ __all__ = [
     "check_direction",
     "check_indices",
     "check_integer",
+    "check_kind",
     "check_number",
+    "check_positive",
     "check_range",
     "check_triple",
     "check_weights",
@@ -24,6 +26,32 @@ __all__ = [
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 Triple = tuple[float, float, float]
+
+
+def check_kind(name: str, value: object, kind: type, source: str = "") -> None:
+    """Check that something is of a class of this package.
+
+    Parameters
+    ----------
+    name : str
+        What it is called in the sentence.
+    value : object
+    kind : type
+    source : str
+        The function that makes one, for the sentence.
+
+    Raises
+    ------
+    ParameterError
+        It is something else.
+
+    Examples
+    --------
+    >>> check_kind("one", 1, int)
+    """
+    if not isinstance(value, kind):
+        made = f", as {source} returns" if source else ""
+        raise ParameterError(f"{name} must be a {kind.__name__}{made}. Got {value!r} instead.")
 
 
 def check_number(name: str, value: object) -> float:
@@ -42,10 +70,7 @@ def check_number(name: str, value: object) -> float:
 def check_depth(name: str, value: object) -> float | str:
     """Return a length greater than 0 as a float, or a share such as '25%' without spaces."""
     if not isinstance(value, str):
-        number = check_number(name, value)
-        if number <= 0.0:
-            raise ParameterError(f"{name} must be greater than 0. Got {value!r} instead.")
-        return number
+        return check_positive(name, value)
     try:
         share = float(value.strip().removesuffix("%")) if value.strip().endswith("%") else math.nan
     except ValueError:
@@ -64,6 +89,14 @@ def check_range(name: str, value: object, low: float, high: float = math.inf) ->
     if not low <= number <= high:
         wanted = f"at least {low:g}" if high > 1e6 else f"between {low:g} and {high:g}"
         raise ParameterError(f"{name} must be {wanted}. Got {value!r} instead.")
+    return number
+
+
+def check_positive(name: str, value: object) -> float:
+    """Return a number greater than 0 as a float."""
+    number = check_number(name, value)
+    if number <= 0.0:
+        raise ParameterError(f"{name} must be greater than 0. Got {value!r} instead.")
     return number
 
 

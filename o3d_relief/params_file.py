@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 from o3d_relief import __version__
 from o3d_relief.errors import FileError, ParameterError
 from o3d_relief.files import check_exists, write_bytes
+from o3d_relief.param_checks import check_kind
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.point_edits import PointEdit
 
@@ -38,11 +39,16 @@ def save_params(path: str | Path, params: ReliefParams, view: View | None = None
     ------
     FileError
         The file cannot be written.
+    ParameterError
+        `params` is no ReliefParams, or `view` no View.
     """
+    view = View() if view is None else view
+    check_kind("params", params, ReliefParams)
+    check_kind("view", view, View)
     values = {
         "o3d_relief": __version__,
         "params": asdict(params),
-        "view": asdict(View() if view is None else view),
+        "view": asdict(view),
     }
     write_bytes(path, (json.dumps(values, indent=1) + "\n").encode())
 

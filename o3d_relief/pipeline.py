@@ -21,6 +21,7 @@ from o3d_relief.linalg.laplacian import cotangent_laplacian
 from o3d_relief.memory import memory_kept
 from o3d_relief.order_step import order_step
 from o3d_relief.output import trimmed_mesh
+from o3d_relief.param_checks import check_kind
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.progress import OnProgress
 from o3d_relief.rays import UnitBox
@@ -104,9 +105,8 @@ def make_relief(
     """
     params = ReliefParams() if params is None else params
     view = View() if view is None else view
-    for name, value, kind in (("params", params, ReliefParams), ("view", view, View)):
-        if not isinstance(value, kind):
-            raise ParameterError(f"{name} must be a {kind.__name__}. Got {value!r} instead.")
+    check_kind("params", params, ReliefParams)
+    check_kind("view", view, View)
     mesh, scanned = _meshed(mesh, scan, view, on_stage, on_progress)
     journal = Journal(on_stage, None if scanned is None else scanned.stages, on_progress)
 

@@ -8,8 +8,8 @@ from types import MappingProxyType
 
 import open3d as o3d
 
-from o3d_relief.errors import ParameterError
 from o3d_relief.journal import Journal, OnStage
+from o3d_relief.param_checks import check_kind
 from o3d_relief.params import View
 from o3d_relief.progress import OnProgress
 from o3d_relief.records import StageRecord
@@ -95,9 +95,8 @@ def scan_points(
     """
     params = ScanParams() if params is None else params
     view = View() if view is None else view
-    for name, value, kind in (("params", params, ScanParams), ("view", view, View)):
-        if not isinstance(value, kind):
-            raise ParameterError(f"{name} must be a {kind.__name__}. Got {value!r} instead.")
+    check_kind("params", params, ScanParams)
+    check_kind("view", view, View)
     journal = Journal(on_stage, on_progress=on_progress)
     journal.begin("points")
     arrays = cloud_arrays(cloud)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from o3d_relief.errors import DisplayError, MeshError, ParameterError, ReliefError
 from o3d_relief.files import check_place
+from o3d_relief.param_checks import check_kind
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.params_file import load_params
 from o3d_relief.scene.arrays import from_open3d
@@ -68,9 +69,8 @@ def edit(
     """
     params = ReliefParams() if params is None else params
     view = View() if view is None else view
-    for name, value, kind in (("params", params, ReliefParams), ("view", view, View)):
-        if not isinstance(value, kind):
-            raise ParameterError(f"{name} must be a {kind.__name__}. Got {value!r} instead.")
+    check_kind("params", params, ReliefParams)
+    check_kind("view", view, View)
     if not size_mm > 0.0:
         raise ParameterError(f"size_mm must be greater than 0. Got {size_mm!r} instead.")
     place = None if output is None else Path(output).absolute()

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from o3d_relief.errors import MeshError
 from o3d_relief.scene.arrays import mended
+from o3d_relief.scene.convert import check_mesh
 from o3d_relief.show.colors import to_linear
 from o3d_relief.show.normals import crease_normals, number_places
 
@@ -91,8 +92,9 @@ def read_surface(mesh: o3d.geometry.TriangleMesh, crease_degrees: float) -> Surf
     Raises
     ------
     MeshError
-        No triangle with an area, a vertex that is not finite, or a face index out of range.
+        No TriangleMesh, no triangle with an area, a vertex that is not finite, or a face index out of range.
     """
+    check_mesh("The mesh to draw", mesh)
     vertices = np.array(mesh.vertices, dtype=np.float64)
     faces = np.array(mesh.triangles, dtype=np.int64)
     if len(faces) == 0:

@@ -10,7 +10,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
-from o3d_relief.errors import DisplayError, ParameterError
+from o3d_relief.errors import DisplayError
+from o3d_relief.param_checks import check_kind
 from o3d_relief.params import View
 from o3d_relief.records import StageRecord
 from o3d_relief.relief import Relief
@@ -61,8 +62,7 @@ class StageViewer:
         size: tuple[int, int] = (1200, 900),
     ) -> None:
         view = View() if view is None else view
-        if not isinstance(view, View):
-            raise ParameterError(f"view must be a View. Got {view!r} instead.")
+        check_kind("view", view, View)
         require_display()
         home = str(Path(__file__).parents[2])
         search = os.pathsep.join(filter(None, [home, os.environ.get("PYTHONPATH", "")]))
@@ -152,7 +152,12 @@ def show_stages(relief: Relief, mesh: o3d.geometry.TriangleMesh | None = None) -
     ------
     DisplayError
         There is no display, or the window could not be opened.
+    ParameterError
+        `relief` is no Relief.
+    MeshError
+        A mesh without a triangle to show.
     """
+    check_kind("relief", relief, Relief, "make_relief")
     with StageViewer(mesh, relief.view) as viewer:
         for record in relief.stages.values():
             viewer(record)

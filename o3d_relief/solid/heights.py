@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from o3d_relief.errors import ParameterError
+from o3d_relief.param_checks import check_kind, check_positive
 from o3d_relief.rays import unit_box
 from o3d_relief.solid.body import PLATE_COLOR, Solid
 from o3d_relief.solid.plate import as_plate
@@ -121,7 +122,8 @@ def height_field(solid: Solid, mm_per_pixel: float) -> HeightField:
     Raises
     ------
     ParameterError
-        Pixels so small that there are more than 40 million, or larger than the piece.
+        Pixels that are not greater than 0, so small that there are more than 40 million, or larger than the
+        piece; something else than a solid.
 
     Examples
     --------
@@ -132,6 +134,8 @@ def height_field(solid: Solid, mm_per_pixel: float) -> HeightField:
     >>> height_field(corner, 1.0).z[2, :2].round(6).tolist()
     [2.0, 1.0]
     """
+    check_kind("solid", solid, Solid, "make_solid")
+    mm_per_pixel = check_positive("mm_per_pixel", mm_per_pixel)
     low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
     width, height, _ = high - low
     columns, rows = check_pixels(width, height, mm_per_pixel)
@@ -205,7 +209,14 @@ def solid_under(field: HeightField, solid: Solid) -> Solid:
     -------
     Solid
         Every line along z meets it once.
+
+    Raises
+    ------
+    ParameterError
+        Something else than a height field and a solid.
     """
+    check_kind("field", field, HeightField, "height_field")
+    check_kind("solid", solid, Solid, "make_solid")
     import manifold3d
 
     thickness = float(np.nanmax(field.z)) - field.back + 1.0

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from o3d_relief.errors import MeshError, ParameterError
+from o3d_relief.errors import MeshError
+from o3d_relief.param_checks import check_kind
 from o3d_relief.plate_params import PlateParams
 from o3d_relief.progress import OnProgress, Progress, Tick, silent
 from o3d_relief.relief import Relief
@@ -87,11 +88,8 @@ def make_solid(
     [80.0, 20.0]
     """
     params = PlateParams() if params is None else params
-    if not isinstance(params, PlateParams):
-        raise ParameterError(f"params must be a PlateParams. Got {params!r} instead.")
-    if not isinstance(relief, Relief):
-        kind = f"{type(relief).__module__}.{type(relief).__qualname__}"
-        raise ParameterError(f"relief must be a Relief, as make_relief returns. Got a {kind} instead.")
+    check_kind("params", params, PlateParams)
+    check_kind("relief", relief, Relief, "make_relief")
     progress = Progress(on_progress)
     progress.begin("solid")
     solid = solid_of(from_open3d(relief.mesh), params, tick=progress.tick)

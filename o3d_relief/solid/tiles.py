@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o3d_relief.errors import ParameterError
+from o3d_relief.param_checks import check_kind
 from o3d_relief.solid.body import Solid
 from o3d_relief.solid.fragments import held
 from o3d_relief.solid.joints import Pins, bar, chosen_pins, joints
@@ -100,8 +101,11 @@ def make_tiles(solid: Solid, params: TileParams) -> Tiling:
     Raises
     ------
     ParameterError
-        Tiles too small for their pins, more than 400 tiles, or pins that fit into none of the joints.
+        Tiles too small for their pins, more than 400 tiles, pins that fit into none of the joints, or
+        something else than a solid and the sizes of tiles.
     """
+    check_kind("solid", solid, Solid, "make_solid")
+    check_kind("params", params, TileParams)
     low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
     pins = chosen_pins(float(low[2]), params)
     columns = _count(high[0] - low[0], params.width_mm, pins.length)
