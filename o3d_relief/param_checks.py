@@ -87,7 +87,9 @@ def check_range(name: str, value: object, low: float, high: float = math.inf) ->
     """Return a number between two others as a float."""
     number = check_number(name, value)
     if not low <= number <= high:
-        wanted = f"at least {low:g}" if high > 1e6 else f"between {low:g} and {high:g}"
+        wanted = f"between {low:g} and {high:g}"
+        if high > 1e6:  # nobody gets there by design
+            wanted = f"at least {low:g}" if number < low else f"at most {int(high):,}"
         raise ParameterError(f"{name} must be {wanted}. Got {value!r} instead.")
     return number
 

@@ -36,6 +36,8 @@ from o3d_relief import ParameterError, ReliefParams, View
         ({"min_gap": 1, "in_order": False}, "min_gap needs in_order"),
         ({"in_front": None}, "in_front must be True or False"),
         ({"seed": -1}, "seed must be at least 0"),
+        ({"seed": 2**32}, "seed must be at most 4,294,967,295"),
+        ({"k": 2**31}, "k must be at most 2,147,483,647"),
         ({"mode": "flat"}, 'mode must be "attenuation" or "bounded"'),
         ({"mode": "bounded"}, 'mode="bounded" needs a depth'),
         ({"mode": "bounded", "alpha": 0.5}, 'mode="bounded" needs a depth'),
