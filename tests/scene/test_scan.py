@@ -87,6 +87,10 @@ def test_records_are_all_there_in_order_read_only_and_picklable(scan):
                 with pytest.raises(ValueError, match="read-only"):
                     value[...] = 0
     assert len(repr(scan)) < 200
+    for again in (pickle.loads(pickle.dumps(scan)), copy.deepcopy(scan)):
+        assert np.array_equal(again.mesh.vertices, scan.mesh.vertices)
+        assert list(again.stages) == STAGES
+        assert again.params == scan.params
 
 
 def test_cloud_is_not_changed_and_its_mesh_can_be(points):
