@@ -21,6 +21,7 @@ __all__ = [
     "check_range",
     "check_triple",
     "check_weights",
+    "check_whole",
 ]
 
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -100,6 +101,21 @@ def check_positive(name: str, value: object) -> float:
     if number <= 0.0:
         raise ParameterError(f"{name} must be greater than 0. Got {value!r} instead.")
     return number
+
+
+def check_whole(name: str, value: object, low: int = 1, high: int | None = None) -> int:
+    """Return a whole number, no float, as an int.
+
+    Examples
+    --------
+    >>> check_whole("jobs", 2)
+    2
+    """
+    whole = not isinstance(value, bool) and isinstance(value, Integral)
+    if not whole or value < low or (high is not None and value > high):  # type: ignore[operator]
+        wanted = f", at least {low}" if high is None else f" between {low} and {high}"
+        raise ParameterError(f"{name} must be a whole number{wanted}. Got {value!r} instead.")
+    return int(value)  # type: ignore[call-overload, no-any-return]
 
 
 def check_integer(name: str, value: object, low: int, high: int) -> int:

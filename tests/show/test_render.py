@@ -470,11 +470,36 @@ def test_a_mesh_that_cannot_be_drawn_raises(vertices, faces, message):
         ({"points": np.zeros((2, 3)), "point_colors": np.zeros((5, 3))}, "point_colors"),
         ({"points": np.zeros((2, 3)), "point_field": np.zeros(5)}, "point_field"),
         ({"background": (1, 1)}, "background"),
+        ({"background": "white"}, "background must be numbers"),
+        ({"size": ("16", 16)}, "size must be a whole number between 1 and 20000"),
+        ({"size": (True, 16)}, "size must be a whole number"),
+        ({"supersampling": 1.5}, "supersampling must be a whole number between 1 and 8"),
+        ({"direction": "front"}, "direction must be three finite numbers"),
+        ({"crease": -1}, "crease must be at least 0"),
+        ({"crease": np.nan}, "crease must be finite"),
+        ({"scale": 0}, "scale must be greater than 0"),
+        ({"scale": -3.0}, "scale must be greater than 0"),
+        ({"scale": np.nan}, "scale must be finite"),
+        ({"bounds": [0, 1]}, r"bounds must have the shape \(2, 3\)"),
+        ({"bounds": "all", "plate": True}, "bounds must be numbers"),
+        ({"colors": np.full((4, 3), np.nan)}, "colors must be finite"),
+        ({"field": list("abcd")}, "field must be numbers"),
+        ({"field": np.zeros(4), "field_range": (1.0, 0.0)}, "the lower one first"),
+        ({"field": np.zeros(4), "field_range": (0.0, np.nan)}, "two finite numbers"),
+        ({"field": np.zeros(4), "field_range": 3}, "field_range must have the shape"),
+        ({"points": np.zeros((1, 3)), "point_radius": -1}, "point_radius must be at least 0"),
+        ({"points": np.zeros((1, 3)), "point_colors": (0, 0, np.inf)}, "point_colors must be finite"),
     ],
 )
 def test_a_wrong_argument_raises(options, message):
     with pytest.raises(ParameterError, match=message):
         render(make_square(), **{"size": (16, 16), **options})
+
+
+def test_sizes_may_be_whole_numbers_of_numpy():
+    plain = render(make_square(), size=(16, 12), supersampling=1)
+    for size in (np.array([16, 12]), (np.int64(16), np.int32(12)), [16, 12]):
+        assert np.array_equal(render(make_square(), size=size, supersampling=np.int64(1)), plain)
 
 
 # --- files ---------------------------------------------------------------------------------------
