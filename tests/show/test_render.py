@@ -496,6 +496,16 @@ def test_a_wrong_argument_raises(options, message):
         render(make_square(), **{"size": (16, 16), **options})
 
 
+@pytest.mark.parametrize("stray", [(np.nan, 0, 0), (1e300, 0, 0), (50, 50, 50), (0, 0, np.inf)])
+def test_vertices_that_no_face_uses_may_be_anything(stray):
+    vertices, faces = [*SQUARE, stray], [(0, 1, 2), (0, 2, 3)]
+    colors = np.full((5, 3), 0.5)
+    plain = render(make_mesh(SQUARE, faces), size=(24, 24), colors=colors[:4])
+    mesh = make_mesh(np.array(vertices), np.array(faces))
+    assert np.array_equal(render(mesh, size=(24, 24), colors=colors), plain)
+    assert np.array_equal(mesh.vertices[4], stray, equal_nan=True)
+
+
 def test_sizes_may_be_whole_numbers_of_numpy():
     plain = render(make_square(), size=(16, 12), supersampling=1)
     for size in (np.array([16, 12]), (np.int64(16), np.int32(12)), [16, 12]):
