@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from o3d_relief.errors import ParameterError
+from o3d_relief.param_checks import check_whole
 
-__all__ = ["as_numbers", "check_array", "check_colors", "check_ends", "check_picture", "check_views"]
+__all__ = [
+    "as_numbers",
+    "check_array",
+    "check_colors",
+    "check_ends",
+    "check_picture",
+    "check_size",
+    "check_views",
+]
 
 
 def as_numbers(name: str, value: object) -> NDArray[np.float64]:
@@ -54,6 +65,21 @@ def check_ends(name: str, value: object) -> tuple[float, float]:
             f"{name} must be two finite numbers, the lower one first. Got {value!r} instead."
         )
     return float(low), float(high)
+
+
+def check_size(size: object) -> tuple[int, int]:
+    """Return width and height of a picture or a window, in pixels.
+
+    Examples
+    --------
+    >>> check_size(np.array([64, 48]))
+    (64, 48)
+    """
+    sides = tuple(size) if isinstance(size, Sequence | np.ndarray) else ()
+    if len(sides) != 2:
+        raise ParameterError(f"size must be two whole numbers. Got {size!r} instead.")
+    width, height = (check_whole("size", side, 1, 20_000) for side in sides)
+    return width, height
 
 
 def check_views(name: str, value: object) -> tuple[tuple[float, float], ...]:

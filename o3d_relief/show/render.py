@@ -11,7 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
-from o3d_relief.array_checks import as_numbers, check_array, check_colors, check_ends, check_picture
+from o3d_relief.array_checks import (
+    as_numbers,
+    check_array,
+    check_colors,
+    check_ends,
+    check_picture,
+    check_size,
+)
 from o3d_relief.errors import ParameterError
 from o3d_relief.files import write_bytes
 from o3d_relief.param_checks import check_positive, check_range, check_whole
@@ -132,7 +139,7 @@ def render(
     >>> image.shape, bool(image[15, 25].sum() > image[32, 38].sum())  # the lamp is at the upper left
     ((48, 64, 3), True)
     """
-    size, supersampling = _check_size(size), check_whole("supersampling", supersampling, 1, 8)
+    size, supersampling = check_size(size), check_whole("supersampling", supersampling, 1, 8)
     crease = check_range("crease", crease, 0.0)
     scale = None if scale is None else check_positive("scale", scale)
     point_radius = check_range("point_radius", point_radius, 0.0)
@@ -213,14 +220,6 @@ def save_png(path: str | Path, image: NDArray[np.uint8]) -> None:
     content = BytesIO()
     Image.fromarray(image).save(content, format="PNG")
     write_bytes(path, content.getvalue())
-
-
-def _check_size(size: object) -> tuple[int, int]:
-    sides = tuple(size) if isinstance(size, Sequence | np.ndarray) else ()
-    if len(sides) != 2:
-        raise ParameterError(f"size must be two whole numbers. Got {size!r} instead.")
-    width, height = (check_whole("size", side, 1, 20_000) for side in sides)
-    return width, height
 
 
 def _check_points(points: ArrayLike) -> NDArray[np.float64]:
