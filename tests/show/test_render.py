@@ -8,6 +8,7 @@ import pytest
 from PIL import Image
 
 from o3d_relief.errors import FileError, MeshError, ParameterError
+from o3d_relief.show.annotate import tick_texts
 from o3d_relief.show.camera import fit_camera, view_axes, view_direction
 from o3d_relief.show.colors import COLORMAPS, apply_colormap, label_colors, to_linear, to_srgb
 from o3d_relief.show.light import sky_directions, tile_index
@@ -279,6 +280,20 @@ def test_the_color_bar_shows_the_color_map():
     bar = image[:, 240:].reshape(-1, 3).astype(int)
     for color in (COLORMAPS["viridis"][0], COLORMAPS["viridis"][-1]):
         assert np.any(np.abs(bar - np.rint(color * 255)).max(axis=1) <= 3)
+
+
+def test_the_numbers_beside_a_bar_are_right():
+    rng = np.random.default_rng(0)
+    ends = [(0.0, 10.0**e) for e in range(-2, 5)] + [(0.0, 0.75), (-2.0, 2.0), (97.0, 98.0)]
+    for low, width in rng.random((300, 2)) * [40.0, 1.0]:
+        ends.append((low - 20.0, low - 20.0 + 10.0 ** (6.0 * width - 2.0)))
+    for low, high in ends:
+        texts = tick_texts(low, high)
+        told = np.array([float(text) for text in texts])
+        assert np.abs(told - np.linspace(low, high, 5)).max() <= 0.025 * (high - low)
+        assert len({len(text.partition(".")[2]) for text in texts}) == 1
+        assert "-0" not in [text.rstrip("0.") for text in texts]
+    assert tick_texts(5.0, 5.0) == ["5.000"] * 5
 
 
 def test_unknown_values_of_a_field_are_grey():
