@@ -79,7 +79,7 @@ def main(scene: str | None = None, output: str = "figure_06.png", *, panel: int 
         low = (points.height - points.differential)[of]
         axes[1, 0].vlines(x[points.index[of]], low, points.height[of], shade, linewidth=3, label=action)
         axes[1, 0].plot(x[points.index[of]], points.height[of], "o", color=shade)
-    axes[1, 0].legend(loc="upper right", fontsize="small")
+    axes[1, 0].legend(loc="upper center", fontsize="small")
     figure.savefig(output, dpi=panel / 4.6)
     plt.close(figure)
     print(f"{output}: {dict(relief.stages['attenuation'].counts)}")

@@ -14,7 +14,7 @@ from o3d_relief.batch_sheet import remove_sheets, write_sheets
 from o3d_relief.batch_task import MOST_ATTEMPTS, BatchTask, Recipe, lost_entry
 from o3d_relief.errors import FileError, ParameterError, ReliefError
 from o3d_relief.files import clear_leftovers
-from o3d_relief.param_checks import given
+from o3d_relief.param_checks import check_whole, given
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.progress import OnProgress, Progress
 from o3d_relief.scan_params import ScanParams
@@ -121,8 +121,7 @@ def make_reliefs(
     Cancelled
         `on_progress` returned False.
     """
-    if jobs is not None and (isinstance(jobs, bool) or not isinstance(jobs, int) or jobs < 1):
-        raise ParameterError(f"jobs must be a whole number, at least 1. Got {jobs!r} instead.")
+    jobs = None if jobs is None else check_whole("jobs", jobs)
     recipe = Recipe(
         params=given("params", params, ReliefParams),
         view=given("view", view, View),

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from o3d_relief import __version__
 from o3d_relief.batch_manifest import PICTURES, BatchEntry, Notes
 from o3d_relief.errors import ParameterError, ReliefError
+from o3d_relief.param_checks import check_kind, check_whole
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.scan_params import ScanParams
 
@@ -55,7 +56,8 @@ class Recipe:
     Raises
     ------
     ParameterError
-        `strict` or `certificates` is not a bool.
+        `strict` or `certificates` is not a bool, parameters are of another class, or `max_triangles` is not
+        a positive whole number.
     """
 
     params: ReliefParams
@@ -67,6 +69,11 @@ class Recipe:
     certificates: bool = False
 
     def __post_init__(self) -> None:
+        check_kind("params", self.params, ReliefParams)
+        check_kind("view", self.view, View)
+        check_kind("scan", self.scan, ScanParams)
+        if self.max_triangles is not None:
+            object.__setattr__(self, "max_triangles", check_whole("max_triangles", self.max_triangles))
         for name in ("strict", "certificates"):
             if not isinstance(getattr(self, name), bool):
                 raise ParameterError(f"{name} must be True or False. Got {getattr(self, name)!r} instead.")

@@ -11,11 +11,11 @@ import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
-from o3d_relief.errors import MeshError, ParameterError
+from o3d_relief.errors import ParameterError
 from o3d_relief.history import History
 from o3d_relief.journal import OnStage
 from o3d_relief.live_scene import LivePoints, LiveScene
-from o3d_relief.param_checks import given
+from o3d_relief.param_checks import check_kind, given
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.params_file import load_params, save_params
 from o3d_relief.pipeline import make_relief
@@ -23,6 +23,7 @@ from o3d_relief.point_edits import PointEdit, merged
 from o3d_relief.progress import OnProgress, Progress
 from o3d_relief.records import AttenuationStage
 from o3d_relief.relief import Relief
+from o3d_relief.scene.convert import check_mesh
 
 __all__ = ["EditorPoints", "ReliefEditor"]
 
@@ -106,11 +107,7 @@ class ReliefEditor:
         view: View | None = None,
         on_progress: OnProgress | None = None,
     ) -> None:
-        if not isinstance(mesh, o3d.geometry.TriangleMesh):
-            raise MeshError(
-                f"The editor takes an open3d.geometry.TriangleMesh. Got a {type(mesh).__name__} instead: "
-                "make a mesh of a point cloud by mesh_from_points first."
-            )
+        check_mesh("The scene", mesh)
         params, view = given("params", params, ReliefParams), given("view", view, View)
         self._mesh = o3d.geometry.TriangleMesh(mesh)
         self._first = params, view
@@ -122,6 +119,7 @@ class ReliefEditor:
 
     def _show(self, params: ReliefParams, view: View) -> None:
         """Go to other parameters; where that fails, everything stays as it was."""
+        check_kind("view", view, View)
         scene = self._scene
         if view != scene.view:
             scene = LiveScene(self._mesh, params, view, self._progress)

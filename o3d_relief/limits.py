@@ -5,7 +5,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from o3d_relief.errors import FileError, MeshError, ParameterError
+from o3d_relief.errors import FileError, MeshError
+from o3d_relief.param_checks import check_whole
 
 __all__ = [
     "MAX_TRIANGLES",
@@ -138,9 +139,7 @@ def check_triangles(count: int, most: int | None = None) -> None:
     MeshError
         Too many triangles, or too little memory for them.
     """
-    if most is not None and (isinstance(most, bool) or not isinstance(most, int) or most < 1):
-        raise ParameterError(f"max_triangles must be a whole number, at least 1. Got {most!r} instead.")
-    most = MAX_TRIANGLES if most is None else most
+    most = MAX_TRIANGLES if most is None else check_whole("max_triangles", most)
     if count > most:
         raise MeshError(
             f"The mesh has {count:,} triangles, more than the {most:,} that are accepted (max_triangles): "

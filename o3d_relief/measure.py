@@ -17,10 +17,12 @@ import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
+from o3d_relief.array_checks import as_numbers, check_views
 from o3d_relief.bounds.grid import grid_pairs
 from o3d_relief.bounds.lines import Lines
 from o3d_relief.bounds.pairs import Pairs, vertex_pairs
-from o3d_relief.errors import ParameterError
+from o3d_relief.errors import MeshError, ParameterError
+from o3d_relief.param_checks import check_whole
 from o3d_relief.relief import Relief
 from o3d_relief.scene.convert import arrays_mesh, mesh_arrays
 from o3d_relief.scene.frame import RELIEF_UNITS
@@ -112,7 +114,7 @@ class Yardstick:
     Raises
     ------
     MeshError
-        A mesh without triangles, or with vertices that are not finite.
+        A mesh without triangles, with vertices that are not finite, or without any extent in x and y.
     ParameterError
         A size or views that cannot be used.
 
@@ -127,15 +129,13 @@ class Yardstick:
     def __init__(
         self, scene: Surface, *, views: Sequence[tuple[float, float]] = SEVEN_VIEWS, size: int = 512
     ) -> None:
-        if not isinstance(size, int) or not 8 <= size <= 8192:
-            raise ParameterError(f"size must be a whole number between 8 and 8192. Got {size!r} instead.")
-        if len(views) == 0 or any(len(view) != 2 for view in views):
-            raise ParameterError(f"views must be pairs of degrees, at least one. Got {views!r} instead.")
-        self._views = tuple((float(yaw), float(pitch)) for yaw, pitch in views)
-        self._size = size
+        self._size = check_whole("size", size, 8, 8192)
+        self._views = check_views("views", views)
         vertices, faces, self._used, self._count = _arrays(scene)
         low, high = vertices.min(axis=0), vertices.max(axis=0)
         self._unit = float((high - low)[:2].max()) / RELIEF_UNITS
+        if self._unit == 0.0:
+            raise MeshError("The scene is seen edge-on, as a point: there is nothing to compare.")
         self._scene = Body(vertices / self._unit, faces, (low + high)[:2] / 2 / self._unit)
         self._reach = np.abs(self._scene.vertices - self._scene.target).max(axis=0)
         self._shots = [self._scene.shoot(view, self._reach, size) for view in self._views]
@@ -217,7 +217,7 @@ class Yardstick:
         """Count pairs and those inverted, visible vertices and those behind S."""
         if heights is None:
             return None, None, None, None
-        z = np.asarray(heights, dtype=np.float64)
+        z = as_numbers("heights", heights)
         if z.shape != (self._count,) or not np.isfinite(z[self._used]).all():
             raise ParameterError(
                 f"heights must be {self._count} finite numbers, one for each vertex of the scene. "
@@ -276,11 +276,17 @@ def measure_relief(
     1.0
     """
     if isinstance(relief, Relief):
-        vertices, faces = mesh_arrays(arrays_mesh(*scene) if isinstance(scene, tuple) else scene)
+        vertices, faces = mesh_arrays(_mesh_of(scene) if isinstance(scene, tuple) else scene)
         to_relief = np.linalg.inv(relief.to_scene)
         scene = vertices @ to_relief[:3, :3].T + to_relief[:3, 3], faces
         relief = relief.mesh
     return Yardstick(scene, views=views, size=size).measure(relief, heights=heights, similarity=similarity)
+
+
+def _mesh_of(surface: tuple[NDArray[np.float64], NDArray[np.int64]]) -> o3d.geometry.TriangleMesh:
+    if len(surface) != 2:
+        raise MeshError(f"A surface as arrays is vertices and faces. Got {len(surface)} arrays instead.")
+    return arrays_mesh(*surface)
 
 
 def _arrays(
@@ -288,7 +294,7 @@ def _arrays(
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64], int]:
     """Return vertices that faces use, faces, the vertices' numbers in the input and how many it has."""
     if isinstance(surface, tuple):
-        surface = arrays_mesh(*surface)
+        surface = _mesh_of(surface)
     vertices, faces = mesh_arrays(surface)
     used, numbered = np.unique(faces, return_inverse=True)
     return vertices[used], numbered.reshape(faces.shape), used, len(vertices)

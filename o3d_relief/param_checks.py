@@ -16,10 +16,13 @@ __all__ = [
     "check_direction",
     "check_indices",
     "check_integer",
+    "check_kind",
     "check_number",
+    "check_positive",
     "check_range",
     "check_triple",
     "check_weights",
+    "check_whole",
     "given",
 ]
 
@@ -29,12 +32,43 @@ Triple = tuple[float, float, float]
 
 _Kind = TypeVar("_Kind")
 
+_LONGEST = 80
+"""Characters of a value that are repeated in a sentence."""
+
+
+def check_kind(name: str, value: object, kind: type, source: str = "") -> None:
+    """Check that something is of a class of this package.
+
+    Parameters
+    ----------
+    name : str
+        What it is called in the sentence.
+    value : object
+    kind : type
+    source : str
+        The function that makes one, for the sentence.
+
+    Raises
+    ------
+    ParameterError
+        It is something else.
+
+    Examples
+    --------
+    >>> check_kind("one", 1, int)
+    """
+    if not isinstance(value, kind):
+        made = f", as {source} returns" if source else ""
+        told = repr(value)
+        if len(told) > _LONGEST or "\n" in told:  # an array, or a whole relief
+            told = f"something of the class {type(value).__name__}"
+        raise ParameterError(f"{name} must be a {kind.__name__}{made}. Got {told} instead.")
+
 
 def given(name: str, value: _Kind | None, kind: type[_Kind]) -> _Kind:
     """Return parameters of a kind, its defaults for None."""
     value = kind() if value is None else value
-    if not isinstance(value, kind):
-        raise ParameterError(f"{name} must be a {kind.__name__}. Got {value!r} instead.")
+    check_kind(name, value, kind)
     return value
 
 
@@ -54,10 +88,7 @@ def check_number(name: str, value: object) -> float:
 def check_depth(name: str, value: object) -> float | str:
     """Return a length greater than 0 as a float, or a share such as '25%' without spaces."""
     if not isinstance(value, str):
-        number = check_number(name, value)
-        if number <= 0.0:
-            raise ParameterError(f"{name} must be greater than 0. Got {value!r} instead.")
-        return number
+        return check_positive(name, value)
     try:
         share = float(value.strip().removesuffix("%")) if value.strip().endswith("%") else math.nan
     except ValueError:
@@ -74,9 +105,34 @@ def check_range(name: str, value: object, low: float, high: float = math.inf) ->
     """Return a number between two others as a float."""
     number = check_number(name, value)
     if not low <= number <= high:
-        wanted = f"at least {low:g}" if high > 1e6 else f"between {low:g} and {high:g}"
+        wanted = f"between {low:g} and {high:g}"
+        if high > 1e6:  # nobody gets there by design
+            wanted = f"at least {low:g}" if number < low else f"at most {int(high):,}"
         raise ParameterError(f"{name} must be {wanted}. Got {value!r} instead.")
     return number
+
+
+def check_positive(name: str, value: object) -> float:
+    """Return a number greater than 0 as a float."""
+    number = check_number(name, value)
+    if number <= 0.0:
+        raise ParameterError(f"{name} must be greater than 0. Got {value!r} instead.")
+    return number
+
+
+def check_whole(name: str, value: object, low: int = 1, high: int | None = None) -> int:
+    """Return a whole number, no float, as an int.
+
+    Examples
+    --------
+    >>> check_whole("jobs", 2)
+    2
+    """
+    whole = not isinstance(value, bool) and isinstance(value, Integral)
+    if not whole or value < low or (high is not None and value > high):  # type: ignore[operator]
+        wanted = f", at least {low}" if high is None else f" between {low} and {high}"
+        raise ParameterError(f"{name} must be a whole number{wanted}. Got {value!r} instead.")
+    return int(value)  # type: ignore[call-overload, no-any-return]
 
 
 def check_integer(name: str, value: object, low: int, high: int) -> int:

@@ -40,7 +40,7 @@ def save_params(path: str | Path, params: ReliefParams, view: View | None = None
     FileError
         The file cannot be written.
     ParameterError
-        Something else than parameters and a view.
+        `params` is no ReliefParams, or `view` no View.
     """
     values = {
         "o3d_relief": __version__,

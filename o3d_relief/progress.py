@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+import numpy as np
+
 from o3d_relief.errors import Cancelled
 
 __all__ = ["NOBODY", "OnProgress", "Progress", "Tick", "share_of_way", "silent"]
@@ -83,7 +85,10 @@ class Progress:
         self._tell()
 
     def _tell(self) -> None:
-        if self._on_progress is not None and self._on_progress(self._stage, self._share) is False:
+        if self._on_progress is None:
+            return
+        answer = self._on_progress(self._stage, self._share)
+        if isinstance(answer, bool | np.bool_) and not answer:
             raise Cancelled(f"The work was called off, in the stage {self._stage}.")
 
 

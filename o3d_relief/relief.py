@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, fields
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from o3d_relief.bounds.certificate import Certificate, certify
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.records import StageRecord, final_heights
 from o3d_relief.scan_params import ScanParams
+from o3d_relief.scene.packed import PackedMesh
 from o3d_relief.scene.weld import weld
 from o3d_relief.stages.trim import Trimmed
 
@@ -23,7 +25,7 @@ __all__ = ["Relief"]
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Relief:
-    """A high relief and how it came about.
+    """A high relief and how it came about. It can be pickled and copied, which Open3D's meshes cannot.
 
     Attributes
     ----------
@@ -66,6 +68,11 @@ class Relief:
             f"<Relief: {len(self.mesh.vertices)} vertices, {len(self.mesh.triangles)} triangles, "
             f"{depth:.4g} deep, stages {', '.join(self.stages)}>"
         )
+
+    def __reduce__(self) -> tuple[Callable[..., Relief], tuple[PackedMesh, dict[str, Any], Any]]:
+        values = {item.name: getattr(self, item.name) for item in fields(self) if item.name != "mesh"}
+        values["stages"] = dict(self.stages)
+        return _restored, (PackedMesh.of(self.mesh), values, vars(self).get("certificate"))
 
     def _repr_png_(self) -> bytes:
         """Show the relief in a notebook: a sheet of views."""
@@ -138,3 +145,10 @@ class Relief:
                 for name, record in self.stages.items()
             },
         }
+
+
+def _restored(mesh: PackedMesh, values: dict[str, Any], certificate: Certificate | None) -> Relief:
+    relief = Relief(mesh=mesh.mesh(), **values | {"stages": MappingProxyType(values["stages"])})
+    if certificate is not None:
+        vars(relief)["certificate"] = certificate
+    return relief

@@ -6,19 +6,12 @@ import math
 from dataclasses import dataclass
 
 from o3d_relief.errors import ParameterError
-from o3d_relief.param_checks import check_number, check_range
+from o3d_relief.param_checks import check_positive, check_range
 
 __all__ = ["PIN_WALL", "MillParams", "TileParams"]
 
 PIN_WALL = 0.6
 """Millimetres of material that stay around the hole of a pin."""
-
-
-def _check_positive(name: str, value: object) -> float:
-    number = check_number(name, value)
-    if number <= 0.0:
-        raise ParameterError(f"{name} must be greater than 0. Got {value!r} instead.")
-    return number
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +48,7 @@ class MillParams:
     keep_ridges: bool = False
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "mm_per_pixel", _check_positive("mm_per_pixel", self.mm_per_pixel))
+        object.__setattr__(self, "mm_per_pixel", check_positive("mm_per_pixel", self.mm_per_pixel))
         object.__setattr__(self, "tool_mm", check_range("tool_mm", self.tool_mm, 0.0))
         object.__setattr__(self, "draft_deg", check_range("draft_deg", self.draft_deg, 0.0, 60.0))
         if not isinstance(self.keep_ridges, bool):
@@ -107,7 +100,7 @@ class TileParams:
             value = getattr(self, name)
             if value is not None:
                 whose = "" if name.startswith("pin") else "The tile's "
-                object.__setattr__(self, name, _check_positive(f"{whose}{name}", value))
+                object.__setattr__(self, name, check_positive(f"{whose}{name}", value))
         object.__setattr__(self, "clearance_mm", check_range("clearance_mm", self.clearance_mm, 0.0, 2.0))
         if not isinstance(self.number, bool):
             raise ParameterError(f"number must be True or False. Got {self.number!r} instead.")

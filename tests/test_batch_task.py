@@ -22,6 +22,16 @@ RECIPE = Recipe(
 )
 
 
+def test_a_recipe_is_checked_before_any_work():
+    assert dataclasses.replace(RECIPE, max_triangles=np.int64(7)) == dataclasses.replace(
+        RECIPE, max_triangles=7
+    )
+    assert dataclasses.replace(RECIPE, max_triangles=np.int64(7)).digest() != RECIPE.digest()
+    for name, value in {"max_triangles": 0, "params": {}, "view": "z", "scan": 3, "strict": 1}.items():
+        with pytest.raises(rel.ParameterError, match=f"{name} must be"):
+            dataclasses.replace(RECIPE, **{name: value})
+
+
 @pytest.fixture
 def task(tmp_path):
     scan = tmp_path / "ball.ply"

@@ -83,3 +83,9 @@ def test_points_that_are_thinned_need_less(monkeypatch):
 def test_what_is_no_number_of_triangles(most):
     with pytest.raises(ParameterError, match="max_triangles must be a whole number, at least 1"):
         limits.check_triangles(1, most)
+
+
+def test_a_whole_number_of_numpy_is_one():
+    limits.check_triangles(5, np.int64(5))
+    with pytest.raises(MeshError, match="more than the 4 that are accepted"):
+        limits.check_triangles(5, np.int64(4))

@@ -196,7 +196,9 @@ def test_bad_size(ball, size):
         Yardstick(ball, size=size)
 
 
-@pytest.mark.parametrize("views", [(), [(0.0, 0.0, 0.0)]])
+@pytest.mark.parametrize(
+    "views", [(), [(0.0, 0.0, 0.0)], None, 5, [0, 20], [("a", "b")], [(np.nan, 0.0)], [(0, 0), (1,)]]
+)
 def test_bad_views(ball, views):
     with pytest.raises(ParameterError, match="views must be pairs"):
         Yardstick(ball, views=views)
@@ -207,6 +209,20 @@ def test_bad_heights(ball, heights):
     wrong = heights if len(heights) == 3 else np.full(len(ball[0]), np.nan)
     with pytest.raises(ParameterError, match="heights must be"):
         measure_relief(ball, ball, views=FRONT, size=16, heights=wrong)
+    with pytest.raises(ParameterError, match="heights must be numbers"):
+        measure_relief(ball, ball, views=FRONT, size=16, heights="high")
+
+
+def test_whole_numbers_of_numpy(ball):
+    assert Yardstick(ball, views=np.zeros((1, 2)), size=np.int64(16)).measure(ball).mean_angle == 0.0
+
+
+def test_a_scene_without_an_extent():
+    point = np.zeros((3, 3)), np.array([[0, 1, 2]])
+    with pytest.raises(MeshError, match="nothing to compare"):
+        Yardstick(point)
+    with pytest.raises(MeshError, match=r"vertices and faces\. Got 3 arrays"):
+        Yardstick((*point, None))
 
 
 def test_bad_arrays(ball):

@@ -73,6 +73,28 @@ def test_records_survive_pickling_and_copying_and_leave_their_source_alone(relie
     visible[0] = False
 
 
+@pytest.mark.parametrize("through", [lambda r: pickle.loads(pickle.dumps(r)), copy.deepcopy])
+def test_a_relief_survives_pickling_and_copying(through):
+    mesh = to_mesh(bust())
+    mesh.paint_uniform_color((0.2, 0.4, 0.6))
+    relief = rel.make_relief(mesh, rel.ReliefParams(depth="25%", attach=[0]))
+    again = through(relief)
+    assert "certificate" not in vars(again)  # nobody has asked for it
+    for one, other in zip(_snapshot(again.mesh), _snapshot(relief.mesh), strict=True):
+        assert np.array_equal(one, other)
+    assert np.array_equal(again.mesh.vertex_colors, relief.mesh.vertex_colors)
+    assert (again.params, again.view, again.scan) == (relief.params, relief.view, None)
+    assert again.report() == relief.report()
+    assert list(again.stages) == list(relief.stages)
+    for value in (again.to_scene, again.source_index, again.stages["bounded"].z):
+        assert not value.flags.writeable
+    with pytest.raises(TypeError):
+        again.stages["scene"] = None
+    assert through(relief).certificate == relief.certificate
+    again.mesh.clear()
+    assert len(relief.mesh.vertices) > 0
+
+
 def test_short_words_for_long_things(relief):
     assert len(repr(relief)) < 250
     assert all(len(repr(record)) < 400 for record in relief.stages.values())

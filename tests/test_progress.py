@@ -62,6 +62,17 @@ def test_each_step_of_the_linear_solver_is_a_chance_to_stop():
     assert len(stopped.shares("construction")) == 4
 
 
+@pytest.mark.parametrize("answer", [False, np.False_])
+def test_false_of_numpy_is_false(answer):
+    with pytest.raises(rel.Cancelled):
+        Progress(lambda _stage, _share: answer).begin("order")
+
+
+@pytest.mark.parametrize("answer", [None, 0, 0.0, "", np.int64(0), True, np.True_])
+def test_any_other_answer_lets_the_work_go_on(answer):
+    Progress(lambda _stage, _share: answer).begin("order")
+
+
 @pytest.mark.parametrize("depth", [None, 20.0])
 def test_it_can_be_called_off_in_every_stage(depth):
     params = rel.ReliefParams(k=8, depth=depth)

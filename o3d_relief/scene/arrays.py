@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from os import PathLike
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -233,7 +234,14 @@ def cloud_arrays(cloud: o3d.geometry.PointCloud) -> CloudArrays:
 
     if not isinstance(cloud, o3d.geometry.PointCloud):
         kind = f"{type(cloud).__module__}.{type(cloud).__qualname__}"
-        raise MeshError(f"The scan must be an open3d.geometry.PointCloud. Got a {kind} instead.")
+        advice = ""
+        if isinstance(cloud, str | PathLike):
+            advice = ": read the file with read_points"
+        elif isinstance(cloud, o3d.t.geometry.PointCloud):
+            advice = ": take what its to_legacy() returns"
+        elif isinstance(cloud, o3d.geometry.TriangleMesh):
+            advice = ": it is a mesh already"
+        raise MeshError(f"The scan must be an open3d.geometry.PointCloud. Got a {kind} instead{advice}.")
     points, colors, normals = (
         np.array(item, dtype=np.float64).reshape(-1, 3)
         for item in (cloud.points, cloud.colors, cloud.normals)

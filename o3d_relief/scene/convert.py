@@ -36,8 +36,10 @@ def check_mesh(name: str, mesh: object) -> None:
     kind, advice = f"{type(mesh).__module__}.{type(mesh).__qualname__}", ""
     if isinstance(mesh, str | PathLike):
         advice = ": read the file with read_mesh"
-    elif isinstance(mesh, o3d.t.geometry.TriangleMesh):
+    elif isinstance(mesh, o3d.t.geometry.TriangleMesh | o3d.t.geometry.PointCloud):
         advice = ": take what its to_legacy() returns"
+    elif isinstance(mesh, o3d.geometry.PointCloud):
+        advice = ": make a mesh of it with mesh_from_points"
     elif isinstance(getattr(mesh, "mesh", None), o3d.geometry.TriangleMesh):
         advice = ": take its mesh"
     raise MeshError(f"{name} must be an open3d.geometry.TriangleMesh. Got a {kind} instead{advice}.")

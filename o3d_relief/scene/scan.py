@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -17,13 +17,14 @@ from o3d_relief.scan.steps import ground_step, normals_step, orientation_step, o
 from o3d_relief.scan.surface_steps import parts_step, skin_step, surface_step
 from o3d_relief.scan_params import ScanParams
 from o3d_relief.scene.arrays import MeshArrays, cloud_arrays, to_open3d
+from o3d_relief.scene.packed import PackedMesh
 
 __all__ = ["Scan", "mesh_from_points", "scan_points"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Scan:
-    """The mesh of a point cloud and how it came about.
+    """The mesh of a point cloud and how it came about. It can be pickled and copied.
 
     Attributes
     ----------
@@ -43,6 +44,13 @@ class Scan:
             f"<Scan: {len(self.mesh.vertices)} vertices, {len(self.mesh.triangles)} triangles, "
             f"stages {', '.join(self.stages)}>"
         )
+
+    def __reduce__(self) -> tuple[Callable[..., Scan], tuple[PackedMesh, dict[str, StageRecord], ScanParams]]:
+        return _restored, (PackedMesh.of(self.mesh), dict(self.stages), self.params)
+
+
+def _restored(mesh: PackedMesh, stages: dict[str, StageRecord], params: ScanParams) -> Scan:
+    return Scan(mesh=mesh.mesh(), stages=MappingProxyType(stages), params=params)
 
 
 def scan_points(

@@ -10,7 +10,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from o3d_relief.show.colors import apply_colormap
 
-__all__ = ["Bar", "annotate", "draw_points", "font_size", "free_area", "write"]
+__all__ = ["Bar", "annotate", "draw_points", "font_size", "free_area", "tick_texts", "write"]
 
 Bar = tuple[str, tuple[float, float], str]  # colour map, range, caption
 Legend = Sequence[tuple[ArrayLike, str]]
@@ -109,22 +109,37 @@ def _draw_bar(picture: Image.Image, draw: ImageDraw.ImageDraw, size: tuple[int, 
     picture.paste(Image.fromarray(strip), (round(left), round(top)))
     x, y = round(left), round(top)
     draw.rectangle((x - 1, y - 1, x + strip.shape[1], y + rows), outline=INK)
-    for part in np.linspace(0.0, 1.0, 5):
+    for part, text in zip(np.linspace(0.0, 1.0, 5), tick_texts(low, high), strict=True):
         y = top + (1.0 - part) * rows
         draw.line((right, y, right + 0.3 * letter, y), fill=INK)
-        text = _number(low + part * (high - low), high - low)
         draw.text((right + 0.5 * letter, y), text, fill=INK, font=_font(round(0.9 * letter)), anchor="lm")
     half = 0.5 * float(_font(letter).getlength(caption))
     middle = min(0.5 * (left + right), size[0] - 0.6 * letter - half)
     draw.text((middle, top - 1.2 * letter), caption, fill=INK, font=_font(letter), anchor="mm")
 
 
-def _number(value: float, width: float) -> str:
+def tick_texts(low: float, high: float) -> list[str]:
+    """Return the numbers beside a colour bar, at its ends and quarters.
+
+    They have as few digits as place them right to a fortieth of the bar.
+
+    Examples
+    --------
+    >>> tick_texts(0.0, 1.0)
+    ['0.00', '0.25', '0.50', '0.75', '1.00']
+    >>> tick_texts(0.0, 22.1)
+    ['0', '6', '11', '17', '22']
+    """
+    width = high - low
+    values = np.linspace(low, high, 5)
     digits = 1 - int(np.floor(np.log10(width))) if width > 0.0 else 3
     if not -4 <= digits <= 5:
-        return f"{value:.2g}"
-    text = f"{value:.{max(digits, 0)}f}"
-    return text.replace("-", "", 1) if float(text) == 0.0 else text
+        return [f"{value:.2g}" for value in values]
+    digits = max(digits, 0)
+    if np.abs(np.round(values, digits) - values).max() > 0.025 * width:
+        digits += 1
+    texts = [f"{value:.{digits}f}" for value in values]
+    return [text.replace("-", "", 1) if float(text) == 0.0 else text for text in texts]
 
 
 def draw_points(

@@ -85,7 +85,10 @@ def view_axes(direction: ArrayLike, up: ArrayLike) -> NDArray[np.float64]:
 
 def unit_vector(name: str, value: ArrayLike) -> NDArray[np.float64]:
     """Check that `value` is a direction and return it with length 1."""
-    vector = np.asarray(value, dtype=np.float64)
+    try:
+        vector = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):  # a name, for instance
+        vector = np.zeros(0)
     if vector.shape != (3,) or not np.all(np.isfinite(vector)) or not np.any(vector):
         raise ParameterError(f"{name} must be three finite numbers, not all zero. Got {value!r} instead.")
     return np.asarray(vector / np.linalg.norm(vector))

@@ -56,7 +56,7 @@ def comparison_sheet(
     MeshError
         Something else than a mesh, or one without a triangle to draw.
     """
-    if not meshes or not yaws:
+    if not meshes or len(yaws) == 0:
         raise ParameterError("A comparison needs a mesh and a view.")
     unknown = sorted(set(plates) - set(meshes))
     if unknown:

@@ -11,9 +11,10 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from o3d_relief.errors import DisplayError, MeshError, ParameterError, ReliefError
+from o3d_relief.array_checks import check_size
+from o3d_relief.errors import DisplayError, MeshError, ReliefError
 from o3d_relief.files import check_place
-from o3d_relief.param_checks import given
+from o3d_relief.param_checks import check_positive, given
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.params_file import load_params
 from o3d_relief.scene.arrays import from_open3d
@@ -68,8 +69,8 @@ def edit(
         No relief can be made of this mesh with these parameters.
     """
     params, view = given("params", params, ReliefParams), given("view", view, View)
-    if not size_mm > 0.0:
-        raise ParameterError(f"size_mm must be greater than 0. Got {size_mm!r} instead.")
+    size_mm = check_positive("size_mm", size_mm)
+    size = check_size(size)
     place = None if output is None else Path(output).absolute()
     if place is not None:
         check_place(place)
@@ -84,7 +85,7 @@ def edit(
             params=params,
             view=view,
             output=place,
-            size_mm=float(size_mm),
+            size_mm=size_mm,
             title=title,
             size=size,
             result=result,

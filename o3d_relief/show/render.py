@@ -11,8 +11,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
+from o3d_relief.array_checks import (
+    as_numbers,
+    check_array,
+    check_colors,
+    check_ends,
+    check_picture,
+    check_size,
+)
 from o3d_relief.errors import ParameterError
 from o3d_relief.files import write_bytes
+from o3d_relief.param_checks import check_positive, check_range, check_whole
 from o3d_relief.show.annotate import Bar, annotate, draw_points, free_area
 from o3d_relief.show.camera import fit_camera, unit_vector, view_direction
 from o3d_relief.show.colors import COLORMAPS, apply_colormap, finite_range, to_linear
@@ -130,19 +139,22 @@ def render(
     >>> image.shape, bool(image[15, 25].sum() > image[32, 38].sum())  # the lamp is at the upper left
     ((48, 64, 3), True)
     """
-    _check_size(size, supersampling)
+    size, supersampling = check_size(size), check_whole("supersampling", supersampling, 1, 8)
+    crease = check_range("crease", crease, 0.0)
+    scale = None if scale is None else check_positive("scale", scale)
+    point_radius = check_range("point_radius", point_radius, 0.0)
     if colormap not in COLORMAPS:
         raise ParameterError(f"colormap must be one of {', '.join(COLORMAPS)}. Got {colormap!r} instead.")
     surface = read_surface(mesh, crease)
     if sum(choice is not None for choice in (colors, field, point_field)) > 1:
         raise ParameterError("colors, field and point_field exclude each other: give one of them.")
-    shown = field_range
-    for values in (field, point_field):
+    shown = None if field_range is None else check_ends("field_range", field_range)
+    for name, values in (("field", field), ("point_field", point_field)):
         if values is not None and shown is None:
-            shown = finite_range(np.asarray(values, dtype=np.float64))
+            shown = finite_range(as_numbers(name, values))
     bar = None if shown is None or (field is None and point_field is None) else (colormap, shown, field_label)
     paint = _paint(len(surface.vertices), colors, sharp_colors, field, bar)
-    box = surface.bounds() if bounds is None else np.asarray(bounds, dtype=np.float64)
+    box = surface.bounds() if bounds is None else check_array("bounds", bounds, (2, 3))
     area = free_area(size, title=title, legend=legend, bar=bar)
     slab = plate_bounds(box) if plate else None
     framed = box if slab is None else np.array([np.minimum(box[0], slab[0]), np.maximum(box[1], slab[1])])
@@ -156,7 +168,7 @@ def render(
             direction=unit_vector("light", light), shadows=shadows, ambient_occlusion=ambient_occlusion
         ),
         slab=slab,
-        background=_check_array("background", background, (3,)),
+        background=check_colors("background", background, (3,)),
         supersampling=supersampling,
     )
     if points is not None:
@@ -204,32 +216,14 @@ def save_png(path: str | Path, image: NDArray[np.uint8]) -> None:
     ParameterError
         Something else than a picture, or one without a pixel.
     """
-    picture = isinstance(image, np.ndarray) and image.dtype == np.uint8 and image.shape[2:] == (3,)
-    if not picture or image.size == 0:
-        found = f"{image.shape} {image.dtype}" if isinstance(image, np.ndarray) else repr(type(image))
-        raise ParameterError(f"image must be (height, width, 3) uint8, not empty. Got {found} instead.")
+    check_picture(image)
     content = BytesIO()
     Image.fromarray(image).save(content, format="PNG")
     write_bytes(path, content.getvalue())
 
 
-def _check_size(size: tuple[int, int], supersampling: int) -> None:
-    sides = tuple(size) if isinstance(size, Sequence) else ()
-    if len(sides) != 2 or not all(isinstance(side, int) and 1 <= side <= 20_000 for side in sides):
-        raise ParameterError(f"size must be two whole numbers between 1 and 20000. Got {size!r} instead.")
-    if not isinstance(supersampling, int) or not 1 <= supersampling <= 8:
-        raise ParameterError(f"supersampling must be between 1 and 8. Got {supersampling!r} instead.")
-
-
-def _check_array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    array = np.asarray(value, dtype=np.float64)
-    if array.shape != shape:
-        raise ParameterError(f"{name} must have the shape {shape}. Got {array.shape} instead.")
-    return array
-
-
 def _check_points(points: ArrayLike) -> NDArray[np.float64]:
-    array = np.asarray(points, dtype=np.float64)
+    array = as_numbers("points", points)
     if array.ndim != 2 or array.shape[1] != 3:
         raise ParameterError(f"points must have the shape (p, 3). Got {array.shape} instead.")
     return array
@@ -239,20 +233,19 @@ def _point_colors(
     count: int, colors: ArrayLike | None, field: ArrayLike | None, bar: Bar | None
 ) -> NDArray[np.float64]:
     if field is not None and bar is not None:
-        return apply_colormap(_check_array("point_field", field, (count,)), bar[0], bar[1])
-    array = np.asarray((0.85, 0.2, 0.15) if colors is None else colors, dtype=np.float64)
-    return (
-        np.tile(array, (count, 1)) if array.shape == (3,) else _check_array("point_colors", array, (count, 3))
-    )
+        return apply_colormap(check_array("point_field", field, (count,)), bar[0], bar[1])
+    array = as_numbers("point_colors", (0.85, 0.2, 0.15) if colors is None else colors)
+    every = np.tile(array, (count, 1)) if array.shape == (3,) else array
+    return check_colors("point_colors", every, (count, 3))
 
 
 def _paint(
     count: int, colors: ArrayLike | None, sharp: bool, field: ArrayLike | None, bar: Bar | None
 ) -> Paint:
     if colors is not None:
-        return Paint(colors=to_linear(_check_array("colors", colors, (count, 3))), sharp=sharp)
+        return Paint(colors=to_linear(check_colors("colors", colors, (count, 3))), sharp=sharp)
     if field is None or bar is None:
         return Paint(sharp=sharp)
     return Paint(
-        field=_check_array("field", field, (count,)), colormap=bar[0], field_range=bar[1], sharp=sharp
+        field=check_array("field", field, (count,)), colormap=bar[0], field_range=bar[1], sharp=sharp
     )

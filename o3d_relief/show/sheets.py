@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from o3d_relief.array_checks import check_picture
 from o3d_relief.errors import FileError, ParameterError
+from o3d_relief.param_checks import check_whole
 from o3d_relief.records import StageRecord
 from o3d_relief.show.annotate import font_size, write
 from o3d_relief.show.camera import fit_scale, view_direction
@@ -56,20 +58,24 @@ def contact_sheet(
     Raises
     ------
     ParameterError
-        No pictures, pictures of different sizes, or a wrong number of columns, titles or labels.
+        No pictures, pictures of different sizes, something else than pictures as `render` returns them and
+        texts, or a wrong number of columns, titles or labels.
 
     Examples
     --------
     >>> contact_sheet([np.zeros((20, 30, 3), dtype=np.uint8)] * 3, 2, gap=0).shape
     (40, 60, 3)
     """
-    if not images or any(image.shape != images[0].shape for image in images):
+    for image in images:
+        check_picture(image)
+    if len({image.shape for image in images}) != 1:
         raise ParameterError("A sheet needs pictures, all of one size.")
-    if columns < 1:
-        raise ParameterError(f"columns must be at least 1. Got {columns!r} instead.")
+    columns = check_whole("columns", columns)
     rows = -(-len(images) // columns)
     if len(titles) not in (0, len(images)) or len(row_labels) not in (0, rows):
         raise ParameterError("A sheet needs a title for each picture or none, a label for each row or none.")
+    if not all(isinstance(text, str) for text in (*titles, *row_labels)):
+        raise ParameterError(f"Titles and labels must be text. Got {(*titles, *row_labels)!r} instead.")
     height, width = images[0].shape[:2]
     letter = round(1.3 * font_size((width, height)))
     heads = [2 * letter if any(titles[row * columns : (row + 1) * columns]) else 0 for row in range(rows)]

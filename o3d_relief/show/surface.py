@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from o3d_relief.errors import MeshError
 from o3d_relief.scene.arrays import mended
+from o3d_relief.scene.convert import check_mesh
 from o3d_relief.show.colors import to_linear
 from o3d_relief.show.normals import crease_normals, number_places
 
@@ -88,19 +89,26 @@ class Surface:
 def read_surface(mesh: o3d.geometry.TriangleMesh, crease_degrees: float) -> Surface:
     """Copy a mesh without its degenerate faces; one that is inside out gets its normals turned.
 
+    Vertices that no face uses are moved to one that is used: they may be anything, also not finite.
+
     Raises
     ------
     MeshError
-        No triangle with an area, a vertex that is not finite, or a face index out of range.
+        No TriangleMesh, no triangle with an area, a face with a vertex that is not finite or an index out of
+        range.
     """
+    check_mesh("The mesh to draw", mesh)
     vertices = np.array(mesh.vertices, dtype=np.float64)
     faces = np.array(mesh.triangles, dtype=np.int64)
     if len(faces) == 0:
         raise MeshError("The mesh has no triangles to draw.")
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise MeshError("The mesh has a face index out of range.")
-    if not np.all(np.isfinite(vertices)):
+    used = np.zeros(len(vertices), dtype=bool)
+    used[faces] = True
+    if not np.all(np.isfinite(vertices[used])):
         raise MeshError("The mesh has vertices that are not finite.")
+    vertices[~used] = vertices[faces[0, 0]]  # wherever they are
     corners = vertices[faces]
     extent = max(float(np.ptp(corners.reshape(-1, 3), axis=0).max()), 1e-300)
     edges = (corners[:, 1:] - corners[:, :1]) / extent

@@ -10,8 +10,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
+from o3d_relief.array_checks import check_size
 from o3d_relief.errors import DisplayError
-from o3d_relief.param_checks import given
+from o3d_relief.param_checks import check_kind, given
 from o3d_relief.params import View
 from o3d_relief.records import StageRecord
 from o3d_relief.relief import Relief
@@ -48,7 +49,7 @@ class StageViewer:
     DisplayError
         There is no display.
     ParameterError
-        `view` is no View.
+        `view` is no View, or `size` not two whole numbers.
     MeshError
         A mesh without a triangle to show.
     """
@@ -62,15 +63,21 @@ class StageViewer:
         size: tuple[int, int] = (1200, 900),
     ) -> None:
         view = given("view", view, View)
+        size = check_size(size)
         require_display()
         home = str(Path(__file__).parents[2])
         search = os.pathsep.join(filter(None, [home, os.environ.get("PYTHONPATH", "")]))
+        self._closed_here = False
         self._process = subprocess.Popen(
             [sys.executable, "-m", "o3d_relief.show.viewer_process"],
             stdin=subprocess.PIPE,
             env={**os.environ, "PYTHONPATH": search},
         )
-        colors = None if mesh is None else vertex_colors(mesh)  # while the process wakes up
+        try:
+            colors = None if mesh is None else vertex_colors(mesh)  # while the process wakes up
+        except BaseException:
+            self.close()
+            raise
         self._send(Opening(viewpoint=view.viewpoint, colors=colors, title=title, size=size))
 
     def __call__(self, record: StageRecord) -> None:
@@ -110,11 +117,12 @@ class StageViewer:
         """
         code = self._process.wait()
         self._end_input()
-        if code != 0:
+        if code != 0 and not self._closed_here:
             raise DisplayError(f"The window of the stages ended with an error (exit code {code}).")
 
     def close(self) -> None:
-        """Close the window, if it is still there."""
+        """Close the window, if it is still there; who waits for that goes on."""
+        self._closed_here = True
         self._end_input()
         self._process.terminate()
         self._process.wait()
@@ -151,7 +159,12 @@ def show_stages(relief: Relief, mesh: o3d.geometry.TriangleMesh | None = None) -
     ------
     DisplayError
         There is no display, or the window could not be opened.
+    ParameterError
+        `relief` is no Relief.
+    MeshError
+        A mesh without a triangle to show.
     """
+    check_kind("relief", relief, Relief, "make_relief")
     with StageViewer(mesh, relief.view) as viewer:
         for record in relief.stages.values():
             viewer(record)

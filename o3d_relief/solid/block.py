@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
+from o3d_relief.param_checks import check_kind
 from o3d_relief.solid.body import PLATE_COLOR, Solid
 from o3d_relief.solid.heights import HeightField
 from o3d_relief.solid.plate import as_plate
@@ -27,7 +28,14 @@ def solid_under(field: HeightField, solid: Solid) -> Solid:
     -------
     Solid
         Every line along z meets it once.
+
+    Raises
+    ------
+    ParameterError
+        Something else than a height field and a solid.
     """
+    check_kind("field", field, HeightField, "height_field")
+    check_kind("solid", solid, Solid, "make_solid")
     import manifold3d
 
     thickness = float(np.nanmax(field.z)) - field.back + 1.0

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from o3d_relief.param_checks import check_kind
 from o3d_relief.plate_params import PlateParams
 from o3d_relief.solid.body import Solid
 from o3d_relief.solid.chain import bodies
@@ -97,7 +98,14 @@ def check_solid(solid: Solid, params: PlateParams) -> SolidReport:
     Returns
     -------
     SolidReport
+
+    Raises
+    ------
+    ParameterError
+        Something else than a solid and a plate.
     """
+    check_kind("solid", solid, Solid, "make_solid")
+    check_kind("params", params, PlateParams)
     vertices, faces = solid.vertices, solid.faces
     watertight, oriented = edges_paired(faces)
     a, b, c = vertices[faces].transpose(1, 0, 2)

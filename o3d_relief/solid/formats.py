@@ -10,6 +10,7 @@ import numpy as np
 
 from o3d_relief.errors import FileError
 from o3d_relief.files import check_place, write_files
+from o3d_relief.param_checks import check_kind
 from o3d_relief.scene.arrays import MeshArrays
 from o3d_relief.scene.encode import encode_mesh
 from o3d_relief.solid.body import PLATE_COLOR, Solid
@@ -60,9 +61,12 @@ def write_solid(path: str | Path, solid: Solid) -> None:
     ------
     FileError
         The file cannot be written.
+    ParameterError
+        `solid` is no Solid.
     MeshError
         A solid whose detail float32 cannot hold.
     """
+    check_kind("solid", solid, Solid, "make_solid")
     write_solids(path, {Path(path).name: solid})
 
 

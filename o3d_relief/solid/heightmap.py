@@ -13,6 +13,7 @@ from PIL.TiffImagePlugin import IFDRational, ImageFileDirectory_v2
 
 from o3d_relief.errors import FileError
 from o3d_relief.files import check_place, write_bytes
+from o3d_relief.param_checks import check_kind
 from o3d_relief.solid.heights import HeightField
 
 __all__ = ["HEIGHT_MAPS", "check_height_map", "encode_height_map", "height_map_scale", "write_height_map"]
@@ -63,7 +64,10 @@ def write_height_map(path: str | Path, field: HeightField) -> None:
     ------
     FileError
         The file cannot be written.
+    ParameterError
+        `field` is no HeightField.
     """
+    check_kind("field", field, HeightField, "height_field")
     check_height_map(path)
     write_bytes(path, encode_height_map(field, tiff=Path(path).suffix.lower() != ".png"))
 

@@ -9,6 +9,7 @@ import open3d as o3d
 from numpy.typing import NDArray
 
 from o3d_relief.errors import ParameterError
+from o3d_relief.param_checks import check_kind, check_positive
 from o3d_relief.rays import unit_box
 from o3d_relief.solid.body import PLATE_COLOR, Solid
 
@@ -121,7 +122,8 @@ def height_field(solid: Solid, mm_per_pixel: float) -> HeightField:
     Raises
     ------
     ParameterError
-        Pixels so small that there are more than 40 million, or larger than the piece.
+        Pixels that are not greater than 0, so small that there are more than 40 million, or larger than the
+        piece; something else than a solid.
 
     Examples
     --------
@@ -132,6 +134,8 @@ def height_field(solid: Solid, mm_per_pixel: float) -> HeightField:
     >>> height_field(corner, 1.0).z[2, :2].round(6).tolist()
     [2.0, 1.0]
     """
+    check_kind("solid", solid, Solid, "make_solid")
+    mm_per_pixel = check_positive("mm_per_pixel", mm_per_pixel)
     low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
     width, height, _ = high - low
     columns, rows = check_pixels(width, height, mm_per_pixel)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from o3d_relief.errors import MeshError, ParameterError
-from o3d_relief.param_checks import given
+from o3d_relief.errors import MeshError
+from o3d_relief.param_checks import check_kind, given
 from o3d_relief.plate_params import PlateParams
 from o3d_relief.progress import OnProgress, Progress, Tick, silent
 from o3d_relief.relief import Relief
@@ -88,9 +88,7 @@ def make_solid(
     [80.0, 20.0]
     """
     params = given("params", params, PlateParams)
-    if not isinstance(relief, Relief):
-        kind = f"{type(relief).__module__}.{type(relief).__qualname__}"
-        raise ParameterError(f"relief must be a Relief, as make_relief returns. Got a {kind} instead.")
+    check_kind("relief", relief, Relief, "make_relief")
     progress = Progress(on_progress)
     progress.begin("solid")
     solid = solid_of(from_open3d(relief.mesh), params, tick=progress.tick)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import grey_dilation, grey_erosion
 
 from o3d_relief.errors import ParameterError
+from o3d_relief.param_checks import check_kind
 from o3d_relief.solid.heights import HeightField
 from o3d_relief.workshop_params import MillParams
 
@@ -40,8 +41,10 @@ def milled(field: HeightField, params: MillParams) -> HeightField:
     Raises
     ------
     ParameterError
-        A tool larger than the piece.
+        A tool larger than the piece, or something else than a height field and the parameters of a mill.
     """
+    check_kind("field", field, HeightField, "height_field")
+    check_kind("params", params, MillParams)
     z, pixel = field.z, field.mm_per_pixel
     extents = [along * pixel for along in z.shape]
     if params.tool_mm > min(extents):

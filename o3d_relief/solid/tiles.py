@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from o3d_relief.errors import ParameterError
+from o3d_relief.param_checks import check_kind
 from o3d_relief.solid.body import Solid
 from o3d_relief.solid.fragments import held
 from o3d_relief.solid.joints import Pins, bar, chosen_pins, joints
@@ -78,6 +79,14 @@ class Tiling:
     def __post_init__(self) -> None:
         object.__setattr__(self, "counts", MappingProxyType(dict(self.counts)))
 
+    def __reduce__(self) -> tuple[Callable[..., Tiling], tuple[dict[str, Any]]]:
+        values = {item.name: getattr(self, item.name) for item in fields(self)}
+        return _restored, (values | {"counts": dict(self.counts)},)
+
+
+def _restored(values: dict[str, Any]) -> Tiling:
+    return Tiling(**values)
+
 
 def make_tiles(solid: Solid, params: TileParams) -> Tiling:
     """Cut a solid into tiles of equal size that fit a printer.
@@ -100,8 +109,11 @@ def make_tiles(solid: Solid, params: TileParams) -> Tiling:
     Raises
     ------
     ParameterError
-        Tiles too small for their pins, more than 400 tiles, or pins that fit into none of the joints.
+        Tiles too small for their pins, more than 400 tiles, pins that fit into none of the joints, or
+        something else than a solid and the sizes of tiles.
     """
+    check_kind("solid", solid, Solid, "make_solid")
+    check_kind("params", params, TileParams)
     low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
     pins = chosen_pins(float(low[2]), params)
     columns, rows = _grid(high - low, params, pins.length)

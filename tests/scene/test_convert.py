@@ -30,7 +30,8 @@ def test_what_is_taken_out_is_a_copy():
         (None, "Got a builtins.NoneType instead.$"),
         ("x.ply", "Got a builtins.str instead: read the file with read_mesh"),
         (o3d.t.geometry.TriangleMesh(), r"instead: take what its to_legacy\(\) returns"),
-        (o3d.geometry.PointCloud(), "geometry.PointCloud instead.$"),
+        (o3d.t.geometry.PointCloud(), r"instead: take what its to_legacy\(\) returns"),
+        (o3d.geometry.PointCloud(), "geometry.PointCloud instead: make a mesh of it with mesh_from_points"),
     ],
 )
 def test_what_is_no_mesh_is_named_and_how_to_make_one(tmp_path, wrong, sentence):
@@ -40,6 +41,10 @@ def test_what_is_no_mesh_is_named_and_how_to_make_one(tmp_path, wrong, sentence)
         check_mesh("The thing", wrong)
     with pytest.raises(rel.MeshError, match=sentence):
         rel.write_mesh(tmp_path / "x.ply", wrong)
+    with pytest.raises(rel.MeshError, match=sentence):
+        rel.ReliefEditor(wrong)
+    with pytest.raises(rel.MeshError, match=sentence):
+        rel.render(wrong)
     assert list(tmp_path.iterdir()) == []
 
 

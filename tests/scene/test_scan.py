@@ -87,6 +87,10 @@ def test_records_are_all_there_in_order_read_only_and_picklable(scan):
                 with pytest.raises(ValueError, match="read-only"):
                     value[...] = 0
     assert len(repr(scan)) < 200
+    for again in (pickle.loads(pickle.dumps(scan)), copy.deepcopy(scan)):
+        assert np.array_equal(again.mesh.vertices, scan.mesh.vertices)
+        assert list(again.stages) == STAGES
+        assert again.params == scan.params
 
 
 def test_cloud_is_not_changed_and_its_mesh_can_be(points):
@@ -312,6 +316,9 @@ class TestRefusals:
         [
             (o3d.geometry.TriangleMesh(), r"must be an open3d\.geometry\.PointCloud\. Got a .*TriangleMesh"),
             (None, "Got a builtins.NoneType"),
+            (o3d.geometry.TriangleMesh(), "TriangleMesh instead: it is a mesh already"),
+            (o3d.t.geometry.PointCloud(), r"instead: take what its to_legacy\(\) returns"),
+            ("lion.ply", "instead: read the file with read_points"),
             (to_cloud(np.zeros((0, 3))), "it has no points"),
             (to_cloud(np.eye(3)), "at least 50 points. Got the 3 points of the cloud, 3 of them finite"),
             (to_cloud(np.full((90, 3), np.nan)), "Got the 90 points of the cloud, 0 of them finite"),

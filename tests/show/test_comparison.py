@@ -15,6 +15,7 @@ def meshes():
 def test_a_column_for_each_mesh_and_a_row_for_each_side(meshes):
     one = comparison_sheet(meshes, panel=(50, 50))
     two = comparison_sheet(meshes, (0.0, 30.0), panel=(50, 50))
+    assert np.array_equal(comparison_sheet(meshes, np.array([0.0, 30.0]), panel=(50, 50)), two)
     assert one.dtype == np.uint8
     assert two.shape[0] > one.shape[0] + 25
     assert two.shape[1] > one.shape[1]  # the labels of the rows

@@ -62,6 +62,8 @@ def test_the_command_says_it_too(on_screen, mesh, tmp_path):
         ({"params": {"k": 3}}, ParameterError, "params must be a ReliefParams"),
         ({"view": "front"}, ParameterError, "view must be a View"),
         ({"size_mm": 0.0}, ParameterError, "size_mm must be greater than 0"),
+        ({"size_mm": "a"}, ParameterError, "size_mm must be a number"),
+        ({"size": (0, 9)}, ParameterError, "size must be a whole number"),
         ({"output": "relief.xyz"}, FileError, "xyz"),
         ({"output": "missing/relief.ply"}, FileError, "the folder missing is missing|is missing"),
     ],

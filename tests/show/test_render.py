@@ -8,6 +8,7 @@ import pytest
 from PIL import Image
 
 from o3d_relief.errors import FileError, MeshError, ParameterError
+from o3d_relief.show.annotate import tick_texts
 from o3d_relief.show.camera import fit_camera, view_axes, view_direction
 from o3d_relief.show.colors import COLORMAPS, apply_colormap, label_colors, to_linear, to_srgb
 from o3d_relief.show.light import sky_directions, tile_index
@@ -281,6 +282,20 @@ def test_the_color_bar_shows_the_color_map():
         assert np.any(np.abs(bar - np.rint(color * 255)).max(axis=1) <= 3)
 
 
+def test_the_numbers_beside_a_bar_are_right():
+    rng = np.random.default_rng(0)
+    ends = [(0.0, 10.0**e) for e in range(-2, 5)] + [(0.0, 0.75), (-2.0, 2.0), (97.0, 98.0)]
+    for low, width in rng.random((300, 2)) * [40.0, 1.0]:
+        ends.append((low - 20.0, low - 20.0 + 10.0 ** (6.0 * width - 2.0)))
+    for low, high in ends:
+        texts = tick_texts(low, high)
+        told = np.array([float(text) for text in texts])
+        assert np.abs(told - np.linspace(low, high, 5)).max() <= 0.025 * (high - low)
+        assert len({len(text.partition(".")[2]) for text in texts}) == 1
+        assert "-0" not in [text.rstrip("0.") for text in texts]
+    assert tick_texts(5.0, 5.0) == ["5.000"] * 5
+
+
 def test_unknown_values_of_a_field_are_grey():
     field = np.full(4, np.nan)
     image = render(make_square(), size=(200, 200), field=field, light=FRONT_LIGHT)
@@ -470,11 +485,46 @@ def test_a_mesh_that_cannot_be_drawn_raises(vertices, faces, message):
         ({"points": np.zeros((2, 3)), "point_colors": np.zeros((5, 3))}, "point_colors"),
         ({"points": np.zeros((2, 3)), "point_field": np.zeros(5)}, "point_field"),
         ({"background": (1, 1)}, "background"),
+        ({"background": "white"}, "background must be numbers"),
+        ({"size": ("16", 16)}, "size must be a whole number between 1 and 20000"),
+        ({"size": (True, 16)}, "size must be a whole number"),
+        ({"supersampling": 1.5}, "supersampling must be a whole number between 1 and 8"),
+        ({"direction": "front"}, "direction must be three finite numbers"),
+        ({"crease": -1}, "crease must be at least 0"),
+        ({"crease": np.nan}, "crease must be finite"),
+        ({"scale": 0}, "scale must be greater than 0"),
+        ({"scale": -3.0}, "scale must be greater than 0"),
+        ({"scale": np.nan}, "scale must be finite"),
+        ({"bounds": [0, 1]}, r"bounds must have the shape \(2, 3\)"),
+        ({"bounds": "all", "plate": True}, "bounds must be numbers"),
+        ({"colors": np.full((4, 3), np.nan)}, "colors must be finite"),
+        ({"field": list("abcd")}, "field must be numbers"),
+        ({"field": np.zeros(4), "field_range": (1.0, 0.0)}, "the lower one first"),
+        ({"field": np.zeros(4), "field_range": (0.0, np.nan)}, "two finite numbers"),
+        ({"field": np.zeros(4), "field_range": 3}, "field_range must have the shape"),
+        ({"points": np.zeros((1, 3)), "point_radius": -1}, "point_radius must be at least 0"),
+        ({"points": np.zeros((1, 3)), "point_colors": (0, 0, np.inf)}, "point_colors must be finite"),
     ],
 )
 def test_a_wrong_argument_raises(options, message):
     with pytest.raises(ParameterError, match=message):
         render(make_square(), **{"size": (16, 16), **options})
+
+
+@pytest.mark.parametrize("stray", [(np.nan, 0, 0), (1e300, 0, 0), (50, 50, 50), (0, 0, np.inf)])
+def test_vertices_that_no_face_uses_may_be_anything(stray):
+    vertices, faces = [*SQUARE, stray], [(0, 1, 2), (0, 2, 3)]
+    colors = np.full((5, 3), 0.5)
+    plain = render(make_mesh(SQUARE, faces), size=(24, 24), colors=colors[:4])
+    mesh = make_mesh(np.array(vertices), np.array(faces))
+    assert np.array_equal(render(mesh, size=(24, 24), colors=colors), plain)
+    assert np.array_equal(mesh.vertices[4], stray, equal_nan=True)
+
+
+def test_sizes_may_be_whole_numbers_of_numpy():
+    plain = render(make_square(), size=(16, 12), supersampling=1)
+    for size in (np.array([16, 12]), (np.int64(16), np.int32(12)), [16, 12]):
+        assert np.array_equal(render(make_square(), size=size, supersampling=np.int64(1)), plain)
 
 
 # --- files ---------------------------------------------------------------------------------------

@@ -54,6 +54,11 @@ def test_titles_and_labels_get_room_beside_the_pictures():
         ([], 1, {}, "needs pictures"),
         ([plain(0), plain(0, 31)], 2, {}, "all of one size"),
         ([plain(0)], 0, {}, "columns"),
+        ([plain(0)], 1.5, {}, "columns must be a whole number"),
+        ([plain(0) / 255.0], 1, {}, "image must be"),
+        ([np.zeros((4, 4, 3))], 1, {}, "float64 instead"),
+        ([1], 1, {}, "image must be"),
+        ([plain(0)], 1, {"titles": [16]}, "must be text"),
         ([plain(0)], 1, {"titles": ["a", "b"]}, "title for each"),
         ([plain(0)], 1, {"row_labels": ["a", "b"]}, "label for each"),
     ],
@@ -61,6 +66,11 @@ def test_titles_and_labels_get_room_beside_the_pictures():
 def test_a_sheet_that_cannot_be_laid_out_raises(images, columns, options, message):
     with pytest.raises(ParameterError, match=message):
         contact_sheet(images, columns, **options)
+
+
+def test_pictures_may_be_one_array():
+    images = np.stack([plain(0), plain(9)])
+    assert np.array_equal(contact_sheet(images, np.int64(2)), contact_sheet(list(images), 2))
 
 
 def test_a_view_sheet_shows_both_rows_at_one_scale():

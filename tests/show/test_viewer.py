@@ -1,13 +1,16 @@
 """The viewer as a callback of a script, its window in a process of its own."""
 
 import os
+import subprocess
 import sys
 
+import open3d as o3d
 import pytest
 
-from o3d_relief.errors import DisplayError, ParameterError
+from o3d_relief.errors import DisplayError, MeshError, ParameterError
 from o3d_relief.show.viewer import StageViewer
 from screen import Program
+from shapes import bust, to_mesh
 
 SCRIPT = """
 import sys
@@ -28,10 +31,6 @@ viewer(relief.stages["scene"])  # nobody is there any more
 
 @pytest.mark.slow
 def test_a_script_is_followed_and_goes_on(screen, tmp_path):
-    import open3d as o3d
-
-    from shapes import bust, to_mesh
-
     scene = tmp_path / "scene.ply"
     o3d.io.write_triangle_mesh(str(scene), to_mesh(bust(20)))
     (tmp_path / "script.py").write_text(SCRIPT)
@@ -71,3 +70,33 @@ def test_no_display(monkeypatch):
 def test_a_view_is_a_view():
     with pytest.raises(ParameterError, match="view must be a View"):
         StageViewer(view="front")
+
+
+@pytest.mark.parametrize("size", [(0, 100), (100,), "large", 100])
+def test_a_size_is_two_whole_numbers(size):
+    with pytest.raises(ParameterError, match="size must be"):
+        StageViewer(size=size)
+
+
+def test_a_mesh_that_cannot_be_shown_leaves_no_process(monkeypatch):
+    started = []
+
+    class Process(subprocess.Popen):
+        def __init__(self, words, **options):
+            super().__init__([sys.executable, "-c", "import sys; sys.stdin.read()"], **options)
+            started.append(self)
+
+    monkeypatch.setattr("o3d_relief.show.viewer.require_display", lambda: None)
+    monkeypatch.setattr("o3d_relief.show.viewer.subprocess.Popen", Process)
+    with pytest.raises(MeshError, match="no triangles to draw"):
+        StageViewer(o3d.geometry.TriangleMesh())
+    (process,) = started
+    assert process.returncode is not None
+    assert process.stdin.closed
+    with StageViewer() as viewer:
+        viewer.close()
+        viewer.wait()  # no error of the window
+    broken = StageViewer()
+    started[-1].kill()
+    with pytest.raises(DisplayError, match="ended with an error"):
+        broken.wait()

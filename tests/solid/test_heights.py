@@ -116,10 +116,18 @@ def test_with_heights_keeps_everything_else():
 
 
 @pytest.mark.parametrize(
-    ("pixel", "sentence"), [(0.001, "must be larger"), (500.0, "smaller than the piece")]
+    ("pixel", "sentence"),
+    [
+        (0.001, "must be larger"),
+        (500.0, "smaller than the piece"),
+        (0.0, "must be greater than 0"),
+        (-1.0, "must be greater than 0"),
+        (float("nan"), "must be finite"),
+        (None, "must be a number"),
+    ],
 )
 def test_pixels_that_do_not_fit_are_refused(pixel, sentence):
-    solid = Solid.from_manifold(plain_of(*_ring()), colored=False) if pixel > 1 else slab()
+    solid = Solid.from_manifold(plain_of(*_ring()), colored=False) if pixel == 500.0 else slab()
     with pytest.raises(ParameterError, match=sentence):
         height_field(solid, pixel)
 

@@ -1,3 +1,6 @@
+import copy
+import pickle
+
 import manifold3d
 import numpy as np
 import open3d as o3d
@@ -62,6 +65,15 @@ def test_tiles_are_closed_and_fit_the_printer(large):
     np.testing.assert_allclose(tiling.tiles[2].solid.size[:2], [165.0 + 4.5, 100.0 + 4.5], atol=1e-9)
     np.testing.assert_allclose(tiling.tiles[3].solid.size[:2], [165.0, 104.5], atol=1e-9)
     assert tiling.tiles[0].solid.vertices[:, 1].max() == pytest.approx(100.0)
+
+
+def test_tiles_survive_pickling_and_copying(large):
+    tiling = make_tiles(large, TileParams(width_mm=170, height_mm=120))
+    for again in (pickle.loads(pickle.dumps(tiling)), copy.deepcopy(tiling)):
+        assert again.counts == tiling.counts
+        for one, other in zip(again.tiles, tiling.tiles, strict=True):
+            assert (one.number, one.pins) == (other.number, other.pins)
+            assert np.array_equal(one.solid.vertices, other.solid.vertices)
 
 
 def test_pins_count_for_the_size_of_a_tile():
