@@ -51,7 +51,7 @@ def make(options: argparse.Namespace) -> int:
     taken = _check_places(options)
     tell_unused(params)
 
-    from o3d_relief.making import make_checked, tell_estimate
+    from o3d_relief.making import check_mill, make_checked, tell_estimate
     from o3d_relief.pipeline import make_relief
     from o3d_relief.progress_bar import StageBar
     from o3d_relief.rehearsal import check_scene
@@ -75,8 +75,10 @@ def make(options: argparse.Namespace) -> int:
         if plate is not None and plate.depth_mm is not None:
             depth = relief_depth(scene, view, plate, max_triangles=options.max_triangles)
             params = replace(params, depth=depth)
+        most, free = options.max_triangles, options.undercut_free
+        if plate is not None and mill is not None:
+            check_mill(scene, view, plate, mill, undercut_free=free, max_triangles=most)
         if options.dry_run:
-            most, free = options.max_triangles, options.undercut_free
             check_scene(scene, params, view, most, solid=plate is not None)
             tell_estimate(scene, params, view, plate, tell, mill=mill, undercut_free=free, max_triangles=most)
             return 0
@@ -87,11 +89,10 @@ def make(options: argparse.Namespace) -> int:
             scan=meshing,
             on_stage=tell_stage,
             on_progress=bar,
-            max_triangles=options.max_triangles,
+            max_triangles=most,
         )
         made = None
         if plate is not None:
-            free = options.undercut_free
             made = make_checked(
                 relief, plate, tell, mill=mill, undercut_free=free, tiles=tiles, on_progress=bar
             )

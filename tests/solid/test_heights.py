@@ -153,6 +153,13 @@ def test_plain_helper_is_a_plate():
     assert plain(plate()).volume() == pytest.approx(9600.0)
 
 
+def test_a_solid_that_needs_too_much_memory_is_refused(monkeypatch):
+    field = height_field(slab(), 0.05)
+    monkeypatch.setattr("o3d_relief.limits.available_memory", lambda: 2**29)
+    with pytest.raises(ParameterError, match=r"0\.05 makes 1200 x 800 .* 1\.1 GB of memory and 0\.5 GB are"):
+        solid_under(field, slab())
+
+
 def test_pixels_of_a_piece():
     assert check_pixels(30.0, 20.1, 0.1) == (300, 201)
     assert check_pixels(0.0, 1.0, 2.0) == (1, 1)
