@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
-from contextlib import closing
+from contextlib import AbstractContextManager, closing
 from dataclasses import dataclass
 from pathlib import Path
 
 from o3d_relief.batch_engine import Engine, open_engine
 from o3d_relief.batch_inputs import find_inputs, output_names
+from o3d_relief.batch_lock import sole_batch
 from o3d_relief.batch_manifest import PICTURES, BatchEntry, Manifest, Notes
 from o3d_relief.batch_sheet import remove_sheets, write_sheets
 from o3d_relief.batch_task import MOST_ATTEMPTS, BatchTask, Recipe, lost_entry
@@ -114,7 +115,7 @@ def make_reliefs(
     ParameterError
         A parameter out of its range.
     FileError
-        The folder cannot be used.
+        The folder cannot be used, or another batch is under way in it.
     ReliefError
         The engine is not installed, or its cluster does not answer.
     Cancelled
@@ -133,21 +134,43 @@ def make_reliefs(
     )
     sources = find_inputs(inputs)
     folder = _made_folder(Path(out))
+    with sole_batch(folder):
+        return _fill(
+            folder,
+            sources,
+            recipe,
+            lambda: open_engine(engine, scheduler, jobs),
+            on_done=on_done,
+            progress=Progress(on_progress),
+        )
+
+
+def _fill(
+    folder: Path,
+    sources: list[str],
+    recipe: Recipe,
+    opened: Callable[[], AbstractContextManager[Engine]],
+    *,
+    on_done: OnDone | None,
+    progress: Progress,
+) -> Batch:
+    """Make what the folder has not, with the workers that `opened` calls."""
+    for place in (folder, folder / PICTURES):
+        clear_leftovers(place)
     manifest = Manifest(folder)
     tasks = _open_tasks(sources, folder, manifest, recipe)
     done = len(sources) - len(tasks)
-    progress = Progress(on_progress)
     progress.begin("batch")
     progress.tick(done / len(sources))
     try:
         if tasks:
             with (
-                open_engine(engine, scheduler, jobs) as workers,
+                opened() as workers,
                 closing(_run(workers, tasks, manifest.notes)) as entries,
             ):
                 for count, entry in enumerate(entries, start=done + 1):
                     manifest.add(entry)
-                    if strict and not entry.made:
+                    if recipe.strict and not entry.made:
                         remove_sheets(folder)  # they may show what was refused
                     if on_done is not None:
                         on_done(entry)
@@ -177,10 +200,7 @@ def _made_folder(folder: Path) -> Path:
         (folder / PICTURES).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise FileError(f"The folder {folder} cannot be made: {error.strerror}.") from error
-    folder = folder.resolve()
-    for place in (folder, folder / PICTURES):
-        clear_leftovers(place)
-    return folder
+    return folder.resolve()
 
 
 def _open_tasks(sources: list[str], folder: Path, manifest: Manifest, recipe: Recipe) -> list[BatchTask]:
