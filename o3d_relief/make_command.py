@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from o3d_relief.console import tell, tell_result, tell_stage, tell_unused, write_report, write_stages
 from o3d_relief.errors import FileError, MeshError, ParameterError, ReliefError
 from o3d_relief.files import check_exists, check_place
+from o3d_relief.option_words import as_options
 from o3d_relief.plate_arguments import chosen_plate
 from o3d_relief.relief_arguments import chosen_params, chosen_view
 from o3d_relief.scan_arguments import chosen_scan
@@ -94,7 +95,13 @@ def make(options: argparse.Namespace) -> int:
         made = None
         if plate is not None:
             made = make_checked(
-                relief, plate, tell, mill=mill, undercut_free=free, tiles=tiles, on_progress=bar
+                relief,
+                plate,
+                lambda line: tell(as_options(line, vars(options))),
+                mill=mill,
+                undercut_free=free,
+                tiles=tiles,
+                on_progress=bar,
             )
     except MeshError as error:
         raise MeshError(f"{options.input}: {error}") from error

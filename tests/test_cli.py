@@ -634,3 +634,12 @@ def test_a_picture_of_the_walls(tmp_path, scene):
     out = tmp_path / "walls.png"
     assert main(["make", str(scene), str(tmp_path / "r.ply"), "-k", "16", "--walls", str(out)]) == 0
     assert out.read_bytes()[:4] == b"\x89PNG"
+
+
+def test_print_checks_name_options_as_they_are_typed(tmp_path, capsys):
+    ball = o3d.geometry.TriangleMesh.create_sphere(3.0, 12).translate((0, 0, 20))
+    both = o3d.geometry.TriangleMesh.create_box(30, 30, 5).translate((-15, -15, 0)) + ball
+    write_mesh(tmp_path / "both.obj", both)
+    command = ["make", str(tmp_path / "both.obj"), str(tmp_path / "s.stl"), "-k", "8", "--width-mm", "50"]
+    assert main(command) == 0
+    assert "--loose bridge ties them, --loose remove leaves them out." in capsys.readouterr().err
