@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from o3d_relief.console import tell, tell_result, tell_stage, tell_unused, write_report, write_stages
 from o3d_relief.errors import FileError, MeshError, ParameterError, ReliefError
-from o3d_relief.files import check_exists, check_place
+from o3d_relief.files import check_exists, check_folder, check_place
 from o3d_relief.option_words import as_options
 from o3d_relief.plate_arguments import chosen_plate
 from o3d_relief.relief_arguments import chosen_params, chosen_view
@@ -216,8 +216,8 @@ def _check_places(options: argparse.Namespace) -> set[Path]:
         if path.resolve() in taken:
             raise FileError(f"{path} is {taken[path.resolve()]}: choose another {name}.")
         taken[path.resolve()] = f"the {name}"
-    if options.stages is not None and options.stages.exists() and not options.stages.is_dir():
-        raise FileError(f"{options.stages} is a file, not a folder for pictures.")
+    if options.stages is not None:
+        check_folder(options.stages)
     return set(taken)
 
 
