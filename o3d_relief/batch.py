@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from o3d_relief.batch_engine import Engine, open_engine
-from o3d_relief.batch_inputs import find_inputs, output_names
+from o3d_relief.batch_inputs import find_inputs
 from o3d_relief.batch_lock import sole_batch
 from o3d_relief.batch_manifest import PICTURES, BatchEntry, Manifest, Notes
+from o3d_relief.batch_recipe import BatchTask, Recipe, open_tasks
 from o3d_relief.batch_sheet import remove_sheets, write_sheets
-from o3d_relief.batch_task import MOST_ATTEMPTS, BatchTask, Recipe, lost_entry
+from o3d_relief.batch_task import MOST_ATTEMPTS, lost_entry
 from o3d_relief.errors import FileError, ParameterError, ReliefError
 from o3d_relief.files import clear_leftovers
 from o3d_relief.params import ReliefParams, View
@@ -158,7 +159,7 @@ def _fill(
     for place in (folder, folder / PICTURES):
         clear_leftovers(place)
     manifest = Manifest(folder)
-    tasks = _open_tasks(sources, folder, manifest, recipe)
+    _, tasks = open_tasks(sources, folder, manifest.entries, recipe)
     done = len(sources) - len(tasks)
     progress.begin("batch")
     progress.tick(done / len(sources))
@@ -201,24 +202,6 @@ def _made_folder(folder: Path) -> Path:
     except OSError as error:
         raise FileError(f"The folder {folder} cannot be made: {error.strerror}.") from error
     return folder.resolve()
-
-
-def _open_tasks(sources: list[str], folder: Path, manifest: Manifest, recipe: Recipe) -> list[BatchTask]:
-    """Return what is still to be done."""
-    names, digest = output_names(sources, folder, manifest.entries, recipe.ending), recipe.digest()
-    tasks = []
-    for source in sources:
-        entry = manifest.entries.get(source)
-        kept = entry is not None and entry.output == names[source] and entry.holds(folder, digest)
-        lacking = recipe.certified and entry is not None and entry.certificate is None
-        refused = recipe.strict and entry is not None and entry.failures
-        if not kept or lacking or refused:
-            tasks.append(
-                BatchTask(
-                    input=source, output=names[source], folder=str(folder), recipe=recipe, digest=digest
-                )
-            )
-    return tasks
 
 
 def _run(workers: Engine, tasks: list[BatchTask], notes: Notes) -> Generator[BatchEntry, None, None]:
