@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
-from contextlib import closing
+from contextlib import AbstractContextManager, closing
 from dataclasses import dataclass
 from pathlib import Path
 
 from o3d_relief.batch_engine import Engine, open_engine
-from o3d_relief.batch_inputs import find_inputs, output_names
+from o3d_relief.batch_inputs import find_inputs
+from o3d_relief.batch_lock import sole_batch
 from o3d_relief.batch_manifest import PICTURES, BatchEntry, Manifest, Notes
+from o3d_relief.batch_recipe import BatchTask, Recipe, open_tasks
 from o3d_relief.batch_sheet import remove_sheets, write_sheets
-from o3d_relief.batch_task import MOST_ATTEMPTS, BatchTask, Recipe, lost_entry
+from o3d_relief.batch_task import MOST_ATTEMPTS, lost_entry
 from o3d_relief.errors import FileError, ParameterError, ReliefError
 from o3d_relief.files import clear_leftovers
 from o3d_relief.param_checks import check_whole, given
@@ -115,7 +117,7 @@ def make_reliefs(
     ParameterError
         A parameter out of its range.
     FileError
-        The folder cannot be used.
+        The folder cannot be used, or another batch is under way in it.
     ReliefError
         The engine is not installed, or its cluster does not answer.
     Cancelled
@@ -133,21 +135,43 @@ def make_reliefs(
     )
     sources = find_inputs(inputs)
     folder = _made_folder(Path(out))
+    with sole_batch(folder):
+        return _fill(
+            folder,
+            sources,
+            recipe,
+            lambda: open_engine(engine, scheduler, jobs),
+            on_done=on_done,
+            progress=Progress(on_progress),
+        )
+
+
+def _fill(
+    folder: Path,
+    sources: list[str],
+    recipe: Recipe,
+    opened: Callable[[], AbstractContextManager[Engine]],
+    *,
+    on_done: OnDone | None,
+    progress: Progress,
+) -> Batch:
+    """Make what the folder has not, with the workers that `opened` calls."""
+    for place in (folder, folder / PICTURES):
+        clear_leftovers(place)
     manifest = Manifest(folder)
-    tasks = _open_tasks(sources, folder, manifest, recipe)
+    _, tasks = open_tasks(sources, folder, manifest.entries, recipe)
     done = len(sources) - len(tasks)
-    progress = Progress(on_progress)
     progress.begin("batch")
     progress.tick(done / len(sources))
     try:
         if tasks:
             with (
-                open_engine(engine, scheduler, jobs) as workers,
+                opened() as workers,
                 closing(_run(workers, tasks, manifest.notes)) as entries,
             ):
                 for count, entry in enumerate(entries, start=done + 1):
                     manifest.add(entry)
-                    if strict and not entry.made:
+                    if recipe.strict and not entry.made:
                         remove_sheets(folder)  # they may show what was refused
                     if on_done is not None:
                         on_done(entry)
@@ -177,28 +201,7 @@ def _made_folder(folder: Path) -> Path:
         (folder / PICTURES).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise FileError(f"The folder {folder} cannot be made: {error.strerror}.") from error
-    folder = folder.resolve()
-    for place in (folder, folder / PICTURES):
-        clear_leftovers(place)
-    return folder
-
-
-def _open_tasks(sources: list[str], folder: Path, manifest: Manifest, recipe: Recipe) -> list[BatchTask]:
-    """Return what is still to be done."""
-    names, digest = output_names(sources, folder, manifest.entries, recipe.ending), recipe.digest()
-    tasks = []
-    for source in sources:
-        entry = manifest.entries.get(source)
-        kept = entry is not None and entry.output == names[source] and entry.holds(folder, digest)
-        lacking = recipe.certified and entry is not None and entry.certificate is None
-        refused = recipe.strict and entry is not None and entry.failures
-        if not kept or lacking or refused:
-            tasks.append(
-                BatchTask(
-                    input=source, output=names[source], folder=str(folder), recipe=recipe, digest=digest
-                )
-            )
-    return tasks
+    return folder.resolve()
 
 
 def _run(workers: Engine, tasks: list[BatchTask], notes: Notes) -> Generator[BatchEntry, None, None]:

@@ -14,6 +14,9 @@ from o3d_relief.scan_arguments import chosen_scan
 
 if TYPE_CHECKING:
     from o3d_relief.batch_manifest import BatchEntry
+    from o3d_relief.batch_rehearsal import Rehearsal
+    from o3d_relief.params import ReliefParams, View
+    from o3d_relief.scan_params import ScanParams
 
 __all__ = ["batch"]
 
@@ -37,6 +40,8 @@ def batch(options: argparse.Namespace) -> int:
     """
     params, view, scan = chosen_params(options), chosen_view(options), chosen_scan(options)
     tell_unused(params)
+    if options.dry_run:
+        return _rehearse(options, params, view, scan)
 
     from o3d_relief.batch import make_reliefs
     from o3d_relief.progress_bar import BatchBar
@@ -73,13 +78,55 @@ def batch(options: argparse.Namespace) -> int:
     return 3 if failed else 0
 
 
+def _rehearse(options: argparse.Namespace, params: ReliefParams, view: View, scan: ScanParams) -> int:
+    """Tell what a batch would make; return the exit code that it would have."""
+    from o3d_relief.batch_recipe import Recipe
+    from o3d_relief.batch_rehearsal import rehearse_reliefs
+
+    recipe = Recipe(
+        params=params,
+        view=view,
+        scan=scan,
+        ending=f".{options.format}",
+        max_triangles=options.max_triangles,
+        strict=options.strict,
+        certificates=options.certificates,
+    )
+    found = []
+    for one in rehearse_reliefs(options.inputs, options.out, recipe):
+        found.append(one)
+        tell(_rehearsed(one, options))
+    failed, done = sum(one.error is not None for one in found), sum(one.already_done for one in found)
+    tell(f"{options.out}: {len(found) - failed - done} reliefs to make, {done} there from an earlier run")
+    if failed:
+        tell(f"{failed} of {len(found)} inputs would fail")
+    return 2 if failed == len(found) else 3 if failed else 0
+
+
+def _rehearsed(one: Rehearsal, options: argparse.Namespace) -> str:
+    """Return what is said of an input before the work."""
+    if one.error is not None:
+        return f"would fail: {_failure(one.input, one.output, one.error, options)}"
+    if one.estimate is None:
+        return f"{one.input} -> {one.output}: there from an earlier run"
+    found = one.estimate
+    x, y, z = (format(side, ".4g") for side in found.size)
+    size = f"{x} x {y} x {'' if found.depth_known else 'at most '}{z} in the unit of the file"
+    needs = f"about {found.triangles} triangles, {found.memory_mb / 1000.0:.1f} GB of memory"
+    return f"{one.input} -> {one.output}: {found.visible_depth:.4g} deep as seen; {size}; {needs}"
+
+
+def _failure(source: str, name: str, error: str, options: argparse.Namespace) -> str:
+    """Return what is wrong with an input, in the words of the command line."""
+    places = (source, str(Path(source).parent), str(options.out.resolve() / name), name)
+    told = as_options(error, vars(options), places)
+    return told if source in error else f"{source}: {told}"
+
+
 def _line(entry: BatchEntry, options: argparse.Namespace) -> str:
     """Return what is said of an input, notes included."""
     if not entry.made:
-        output = str(options.out.resolve() / entry.output)
-        folder = str(Path(entry.input).parent)
-        error = as_options(str(entry.error), vars(options), (entry.input, folder, output, entry.output))
-        return f"failed: {error}" if entry.input in str(entry.error) else f"failed: {entry.input}: {error}"
+        return f"failed: {_failure(entry.input, entry.output, str(entry.error), options)}"
     told = f"{entry.triangles} triangles, {entry.depth:.4g} deep, {entry.seconds:.1f} s"
     if entry.certificate is not None:
         told += f"; certificate: {'fails' if entry.failures else 'clean'}"

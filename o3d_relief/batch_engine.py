@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from o3d_relief.batch_manifest import BatchEntry
-from o3d_relief.batch_task import MOST_ATTEMPTS, BatchTask, run_task
+from o3d_relief.batch_recipe import BatchTask
+from o3d_relief.batch_task import MOST_ATTEMPTS, run_task
 from o3d_relief.errors import ParameterError, ReliefError
 
 __all__ = ["ENGINES", "Engine", "open_engine"]

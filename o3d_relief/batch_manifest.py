@@ -13,7 +13,7 @@ from typing import Any
 from o3d_relief.errors import FileError
 from o3d_relief.files import write_bytes
 
-__all__ = ["MANIFEST", "PICTURES", "BatchEntry", "Manifest", "Notes"]
+__all__ = ["MANIFEST", "PICTURES", "BatchEntry", "Manifest", "Notes", "read_entries"]
 
 MANIFEST = "manifest.jsonl"
 PICTURES = "pictures"
@@ -203,30 +203,11 @@ class Manifest:
         self._path = folder / MANIFEST
         self.notes = Notes(folder)
         self.entries: dict[str, BatchEntry] = {}
-        for entry in self._lines():
+        for entry in _lines(self._path):
             self.entries[entry.input] = entry
         if self.notes.kept():
             self.settle()
         self.notes.remove()  # from here on, notes are those of this run
-
-    def _lines(self) -> list[BatchEntry]:
-        if not self._path.exists():
-            return []
-        try:
-            lines = self._path.read_text(encoding="utf-8").split("\n")
-        except (OSError, UnicodeDecodeError) as error:
-            raise FileError(f"{self._path} cannot be read: {error}. Move it away first.") from error
-        entries = []
-        # After the last line break is what was being written when everything was killed; it is in the notes.
-        for number, line in enumerate(lines[:-1], start=1):
-            try:
-                entries.append(BatchEntry.from_line(line))
-            except ValueError as error:
-                raise FileError(
-                    f"{self._path} is not the manifest of a batch, see line {number}: move it away, or "
-                    "choose another folder."
-                ) from error
-        return entries
 
     def add(self, entry: BatchEntry) -> None:
         """Add what became of an input."""
@@ -242,11 +223,51 @@ class Manifest:
         order : iterable of str
             Inputs that come first; others that the folder holds follow.
         """
-        for entry in self.notes.kept():
-            # What was ended between the note and the file has no relief, or an older one.
-            if not entry.made or entry.holds(self._path.parent, entry.recipe):
-                self.entries[entry.input] = entry
+        self.entries |= _noted(self.notes, self._path.parent)
         inputs = dict.fromkeys([*order, *self.entries])
         self.entries = {source: self.entries[source] for source in inputs if source in self.entries}
         write_bytes(self._path, "".join(entry.line() for entry in self.entries.values()).encode())
         self.notes.remove()
+
+
+def read_entries(folder: Path) -> dict[str, BatchEntry]:
+    """Return what the folder of a batch holds, by input; nothing is written.
+
+    Parameters
+    ----------
+    folder : Path
+        May be missing.
+
+    Raises
+    ------
+    FileError
+        The manifest is there and is none.
+    """
+    return {entry.input: entry for entry in _lines(folder / MANIFEST)} | _noted(Notes(folder), folder)
+
+
+def _noted(notes: Notes, folder: Path) -> dict[str, BatchEntry]:
+    # What was ended between the note and the file has no relief, or an older one.
+    return {
+        entry.input: entry for entry in notes.kept() if not entry.made or entry.holds(folder, entry.recipe)
+    }
+
+
+def _lines(path: Path) -> list[BatchEntry]:
+    if not path.exists():
+        return []
+    try:
+        lines = path.read_text(encoding="utf-8").split("\n")
+    except (OSError, UnicodeDecodeError) as error:
+        raise FileError(f"{path} cannot be read: {error}. Move it away first.") from error
+    entries = []
+    # After the last line break is what was being written when everything was killed; it is in the notes.
+    for number, line in enumerate(lines[:-1], start=1):
+        try:
+            entries.append(BatchEntry.from_line(line))
+        except ValueError as error:
+            raise FileError(
+                f"{path} is not the manifest of a batch, see line {number}: move it away, or "
+                "choose another folder."
+            ) from error
+    return entries

@@ -5,117 +5,35 @@ from __future__ import annotations
 import json
 import threading
 import time
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from o3d_relief import __version__
 from o3d_relief.batch_manifest import PICTURES, BatchEntry, Notes
-from o3d_relief.errors import ParameterError, ReliefError
-from o3d_relief.param_checks import check_kind, check_whole
-from o3d_relief.params import ReliefParams, View
+from o3d_relief.batch_recipe import BatchTask
+from o3d_relief.errors import ReliefError
 from o3d_relief.scan_params import ScanParams
 
 if TYPE_CHECKING:
     from open3d.geometry import PointCloud, TriangleMesh
 
-__all__ = ["MOST_ATTEMPTS", "BatchTask", "Recipe", "lost_entry", "run_task"]
+__all__ = [
+    "MOST_ATTEMPTS",
+    "error_sentence",
+    "lost_entry",
+    "read_input",
+    "run_task",
+]
 
 MOST_ATTEMPTS = 2
 """An input that has cost so many workers their lives is given up."""
 
 _PICTURE = (320, 320)
 
-_WITHOUT_EFFECT = ("strict", "certificates")
-"""They do not change what a relief is."""
-
 _ALONE = threading.Lock()
 """Workers of several threads make one relief at a time: the threads of the linear algebra are set for a whole
 process, and nobody counts on the memory of two."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Recipe:
-    """How the reliefs of a batch are made.
-
-    Attributes
-    ----------
-    params : ReliefParams
-    view : View
-    scan : ScanParams
-        For inputs that are point clouds.
-    ending : str
-        Of the reliefs' files: ".ply".
-    max_triangles : int or None
-    strict : bool
-        Whether a relief whose certificate is not clean is refused.
-    certificates : bool
-        Whether a certificate is made of each relief; always where `strict` is.
-
-    Raises
-    ------
-    ParameterError
-        `strict` or `certificates` is not a bool, parameters are of another class, or `max_triangles` is not
-        a positive whole number.
-    """
-
-    params: ReliefParams
-    view: View
-    scan: ScanParams
-    ending: str
-    max_triangles: int | None
-    strict: bool = False
-    certificates: bool = False
-
-    def __post_init__(self) -> None:
-        check_kind("params", self.params, ReliefParams)
-        check_kind("view", self.view, View)
-        check_kind("scan", self.scan, ScanParams)
-        if self.max_triangles is not None:
-            object.__setattr__(self, "max_triangles", check_whole("max_triangles", self.max_triangles))
-        for name in ("strict", "certificates"):
-            if not isinstance(getattr(self, name), bool):
-                raise ParameterError(f"{name} must be True or False. Got {getattr(self, name)!r} instead.")
-
-    @property
-    def certified(self) -> bool:
-        """Whether certificates are made."""
-        return self.strict or self.certificates
-
-    def digest(self) -> str:
-        """Return the SHA-256 of what makes a relief the one it is, and of the package's version."""
-        values = {name: value for name, value in asdict(self).items() if name not in _WITHOUT_EFFECT}
-        text = json.dumps([__version__, values], sort_keys=True)
-        return sha256(text.encode()).hexdigest()
-
-
-@dataclass(frozen=True, kw_only=True)
-class BatchTask:
-    """One input and where its relief goes.
-
-    Attributes
-    ----------
-    input : str
-        The file, with its whole path.
-    output : str
-        Name of the relief in the folder.
-    folder : str
-        Of the batch, with its whole path.
-    recipe : Recipe
-    digest : str
-        Of the recipe.
-    """
-
-    input: str
-    output: str
-    folder: str
-    recipe: Recipe
-    digest: str
-
-    def entry(self, **values: Any) -> BatchEntry:
-        """Return what the manifest says of the input."""
-        return BatchEntry(input=self.input, output=self.output, recipe=self.digest, **values)
 
 
 def run_task(task: BatchTask) -> BatchEntry:
@@ -150,7 +68,7 @@ def run_task(task: BatchTask) -> BatchEntry:
             entry = task.entry(
                 status="failed",
                 seconds=_since(started),
-                error=_sentence(error),
+                error=error_sentence(error),
                 attempts=attempts,
                 **stamp,
             )
@@ -188,7 +106,17 @@ def _since(started: float) -> float:
     return round(time.perf_counter() - started, 3)
 
 
-def _sentence(error: Exception) -> str:
+def error_sentence(error: Exception) -> str:
+    """Say what went wrong with an input.
+
+    Parameters
+    ----------
+    error : Exception
+
+    Returns
+    -------
+    str
+    """
     if isinstance(error, ReliefError):
         return str(error)
     if isinstance(error, MemoryError):
@@ -203,7 +131,7 @@ def _make(task: BatchTask, notes: Notes, started: float, known: dict[str, Any]) 
     from o3d_relief.show.render import render, save_png
 
     recipe, folder = task.recipe, Path(task.folder)
-    scene, scan, left_out = _read(Path(task.input), recipe.scan)
+    scene, scan, left_out = read_input(Path(task.input), recipe.scan)
     relief = make_relief(
         scene, recipe.params, view=recipe.view, scan=scan, max_triangles=recipe.max_triangles
     )
@@ -236,8 +164,24 @@ def _make(task: BatchTask, notes: Notes, started: float, known: dict[str, Any]) 
     return entry
 
 
-def _read(path: Path, scan: ScanParams) -> tuple[TriangleMesh | PointCloud, ScanParams | None, list[str]]:
-    """Return the scene, how it is meshed where it is a point cloud, and what was left out."""
+def read_input(
+    path: Path, scan: ScanParams
+) -> tuple[TriangleMesh | PointCloud, ScanParams | None, list[str]]:
+    """Read an input.
+
+    Parameters
+    ----------
+    path : Path
+    scan : ScanParams
+
+    Returns
+    -------
+    scene : open3d.geometry.TriangleMesh or open3d.geometry.PointCloud
+    scan : ScanParams or None
+        How it is meshed, where it is a point cloud.
+    left_out : list of str
+        What of the file was not read.
+    """
     from o3d_relief.scene.arrays import MeshArrays, to_open3d
     from o3d_relief.scene.read import left_out, read_arrays
 

@@ -10,8 +10,15 @@ from pathlib import Path
 
 from o3d_relief.errors import FileError
 
-__all__ = ["check_exists", "check_place", "clear_leftovers", "remove_files", "write_bytes", "write_files"]
-
+__all__ = [
+    "check_exists",
+    "check_folder",
+    "check_place",
+    "clear_leftovers",
+    "remove_files",
+    "write_bytes",
+    "write_files",
+]
 
 _WORK = ".o3d-relief-"
 """Start of the names of the folders in which files are written before they are renamed; 8 letters follow."""
@@ -72,6 +79,31 @@ def _check(path: Path) -> None:
         raise FileError(
             f"{path} cannot be written, the folder {path.parent} is read-only: choose another one."
         )
+
+
+def check_folder(path: str | Path) -> None:
+    """Check, before any long work, that files can be written into a folder, which may have to be made.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Raises
+    ------
+    FileError
+        A file in its place or above it, or no right to write there.
+    """
+    path = Path(path)
+    try:
+        there = next(place for place in (path, *path.absolute().parents) if place.exists())
+    except OSError as error:  # a name that is too long, a folder that may not be entered
+        raise FileError(f"The folder {path} cannot be made: {error.strerror}.") from error
+    if not there.is_dir():
+        words = "" if there == path else f"The folder {path} cannot be made, "
+        raise FileError(f"{words}{there} is a file, not a folder: choose another place.")
+    if not os.access(there, os.W_OK | os.X_OK):
+        words = f"The folder {path}" if there == path else f"The folder {path} cannot be made, {there}"
+        raise FileError(f"{words} is read-only: choose another place.")
 
 
 def clear_leftovers(folder: str | Path) -> None:

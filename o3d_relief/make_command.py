@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 from o3d_relief.console import tell, tell_result, tell_stage, tell_unused, write_report, write_stages
 from o3d_relief.errors import FileError, MeshError, ParameterError, ReliefError
-from o3d_relief.files import check_exists, check_place
+from o3d_relief.files import check_exists, check_folder, check_place
+from o3d_relief.option_words import as_options
 from o3d_relief.plate_arguments import chosen_plate
 from o3d_relief.relief_arguments import chosen_params, chosen_view
 from o3d_relief.scan_arguments import chosen_scan
@@ -51,7 +52,7 @@ def make(options: argparse.Namespace) -> int:
     taken = _check_places(options)
     tell_unused(params)
 
-    from o3d_relief.making import make_checked, tell_estimate
+    from o3d_relief.making import check_mill, make_checked, tell_estimate
     from o3d_relief.pipeline import make_relief
     from o3d_relief.progress_bar import StageBar
     from o3d_relief.rehearsal import check_scene
@@ -75,8 +76,10 @@ def make(options: argparse.Namespace) -> int:
         if plate is not None and plate.depth_mm is not None:
             depth = relief_depth(scene, view, plate, max_triangles=options.max_triangles)
             params = replace(params, depth=depth)
+        most, free = options.max_triangles, options.undercut_free
+        if plate is not None and mill is not None:
+            check_mill(scene, view, plate, mill, undercut_free=free, max_triangles=most)
         if options.dry_run:
-            most, free = options.max_triangles, options.undercut_free
             check_scene(scene, params, view, most, solid=plate is not None)
             tell_estimate(scene, params, view, plate, tell, mill=mill, undercut_free=free, max_triangles=most)
             return 0
@@ -87,13 +90,18 @@ def make(options: argparse.Namespace) -> int:
             scan=meshing,
             on_stage=tell_stage,
             on_progress=bar,
-            max_triangles=options.max_triangles,
+            max_triangles=most,
         )
         made = None
         if plate is not None:
-            free = options.undercut_free
             made = make_checked(
-                relief, plate, tell, mill=mill, undercut_free=free, tiles=tiles, on_progress=bar
+                relief,
+                plate,
+                lambda line: tell(as_options(line, vars(options))),
+                mill=mill,
+                undercut_free=free,
+                tiles=tiles,
+                on_progress=bar,
             )
     except MeshError as error:
         raise MeshError(f"{options.input}: {error}") from error
@@ -208,8 +216,8 @@ def _check_places(options: argparse.Namespace) -> set[Path]:
         if path.resolve() in taken:
             raise FileError(f"{path} is {taken[path.resolve()]}: choose another {name}.")
         taken[path.resolve()] = f"the {name}"
-    if options.stages is not None and options.stages.exists() and not options.stages.is_dir():
-        raise FileError(f"{options.stages} is a file, not a folder for pictures.")
+    if options.stages is not None:
+        check_folder(options.stages)
     return set(taken)
 
 

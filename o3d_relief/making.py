@@ -11,20 +11,21 @@ import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
+from o3d_relief.limits import field_memory
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.plate_params import PlateParams
 from o3d_relief.progress import OnProgress, Progress
 from o3d_relief.relief import Relief
 from o3d_relief.solid.body import Solid
 from o3d_relief.solid.checks import SolidReport, check_solid
-from o3d_relief.solid.estimate import estimate_relief, estimate_solid
+from o3d_relief.solid.estimate import estimate_relief, estimate_solid, front_size
 from o3d_relief.solid.heights import check_pixels
 from o3d_relief.solid.make import make_solid
 from o3d_relief.solid.measures import wall_thickness
 from o3d_relief.workshop import Work, work_on
 from o3d_relief.workshop_params import MillParams, TileParams
 
-__all__ = ["Made", "make_checked", "tell_estimate", "wall_picture"]
+__all__ = ["Made", "check_mill", "make_checked", "tell_estimate", "wall_picture"]
 
 Tell = Callable[[str], None]
 
@@ -95,6 +96,40 @@ def make_checked(
     return Made(solid=solid, plate=plate, report=report, work=work)
 
 
+def check_mill(
+    mesh: o3d.geometry.TriangleMesh,
+    view: View,
+    plate: PlateParams,
+    mill: MillParams,
+    *,
+    undercut_free: bool,
+    max_triangles: int | None = None,
+) -> None:
+    """Refuse a height field of too many pixels before the relief is made.
+
+    Parameters
+    ----------
+    mesh : open3d.geometry.TriangleMesh
+    view : View
+    plate : PlateParams
+    mill : MillParams
+        Of the height field that is taken of the solid.
+    undercut_free : bool
+        Whether the solid becomes that height field.
+    max_triangles : int, optional
+        As in `make_relief`.
+
+    Raises
+    ------
+    MeshError
+        A mesh from which no relief, or no solid, can be made.
+    ParameterError
+        More pixels than a height field may have, or than there is memory for.
+    """
+    size = front_size(mesh, view, plate, max_triangles=max_triangles)
+    check_pixels(*size, mill.mm_per_pixel, about=True, solid=undercut_free)
+
+
 def tell_estimate(
     mesh: o3d.geometry.TriangleMesh,
     params: ReliefParams,
@@ -129,8 +164,9 @@ def tell_estimate(
     MeshError
         A mesh from which no relief, or no solid, can be made.
     ParameterError
-        More pixels than a height field may have.
+        More pixels than a height field may have, or than there is memory for.
     """
+    field_mb = 0.0
     if plate is None:
         found = estimate_relief(mesh, params, view, max_triangles=max_triangles)
         precision, unit = ".4g", "in the unit of the file: a surface, no solid (--width-mm)"
@@ -138,7 +174,8 @@ def tell_estimate(
         found = estimate_solid(mesh, params, view, plate, max_triangles=max_triangles)
         precision, unit = ".2f", "mm"
         if mill is not None:
-            check_pixels(*found.size[:2], mill.mm_per_pixel, about=True)
+            columns, rows = check_pixels(*found.size[:2], mill.mm_per_pixel, about=True, solid=undercut_free)
+            field_mb = field_memory(columns * rows, solid=undercut_free) / 1e6
     x, y, z = (format(side, precision) for side in found.size)
     tell(f"seen      {found.visible_depth:.4g} deep, in the unit of the file; --depth 100% is all of it")
     tell(f"size      {x} x {y} x {'' if found.depth_known else 'at most '}{z} {unit}")
@@ -147,7 +184,7 @@ def tell_estimate(
     finer = ", more where textures become colours" if mesh.has_textures() else ""
     finer += ", more in a height field" if undercut_free else ""
     tell(f"triangles about {found.triangles}{finer}")
-    tell(f"memory    about {found.memory_mb / 1000.0:.1f} GB")
+    tell(f"memory    about {(found.memory_mb + field_mb) / 1000.0:.1f} GB")
 
 
 def wall_picture(

@@ -139,14 +139,15 @@ def check_workshop(plate: PlateParams | None, mill: MillParams | None, tiles: Ti
     Raises
     ------
     ParameterError
-        A tool wider than the piece, a plate too thin for the pins, tiles smaller than their pins.
+        A tool or pixels wider than the piece, a plate too thin for the pins, tiles smaller than their pins.
     """
     if plate is None:
         return
-    if mill is not None and mill.tool_mm >= plate.width_mm:
-        raise ParameterError(
-            f"tool_mm must be smaller than the piece, which is {plate.width_mm:g} mm wide. "
-            f"Got {mill.tool_mm:g} instead."
-        )
+    for name in ("tool_mm", "mm_per_pixel"):
+        if mill is not None and getattr(mill, name) >= plate.width_mm:
+            raise ParameterError(
+                f"{name} must be smaller than the piece, which is {plate.width_mm:g} mm wide. "
+                f"Got {getattr(mill, name):g} instead."
+            )
     if tiles is not None:
         tiles.pin_for(plate.back_mm)

@@ -348,3 +348,20 @@ def test_called_off(tmp_path):
     assert len(kept) <= batch.already_done < 6
     assert [Path(entry.input).name for entry in batch.entries] == [path.name for path in inputs]
     assert hidden(out) == []
+
+
+def test_a_folder_is_filled_by_one_batch_at_a_time(tmp_path):
+    ours, theirs = write_balls(tmp_path / "ours", 1), write_balls(tmp_path / "theirs", 1)
+    params, refused = rel.ReliefParams(k=4, in_order=False), []
+
+    def meanwhile(_entry):  # the name is taken: both balls are called alike
+        with pytest.raises(rel.FileError, match="Another batch is under way") as caught:
+            rel.make_reliefs(theirs, tmp_path / "out", params, jobs=1)
+        refused.append(caught.value)
+
+    rel.make_reliefs(ours, tmp_path / "out", params, jobs=1, on_done=meanwhile)
+    assert len(refused) == 1
+    assert [entry["input"] for entry in lines(tmp_path / "out")] == [str(ours[0])]
+    both = rel.make_reliefs(theirs, tmp_path / "out", params, jobs=1)
+    assert [entry.output for entry in both.entries] == ["ball_00_2.ply"]
+    assert hidden(tmp_path / "out") == []

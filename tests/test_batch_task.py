@@ -9,7 +9,8 @@ import pytest
 
 import o3d_relief as rel
 from o3d_relief.batch_manifest import Notes
-from o3d_relief.batch_task import BatchTask, Recipe, run_task
+from o3d_relief.batch_recipe import BatchTask, Recipe
+from o3d_relief.batch_task import run_task
 from o3d_relief.bounds.certificate import Certificate
 from shapes import bust, hills, sphere, to_mesh
 
@@ -20,16 +21,6 @@ RECIPE = Recipe(
     ending=".ply",
     max_triangles=None,
 )
-
-
-def test_a_recipe_is_checked_before_any_work():
-    assert dataclasses.replace(RECIPE, max_triangles=np.int64(7)) == dataclasses.replace(
-        RECIPE, max_triangles=7
-    )
-    assert dataclasses.replace(RECIPE, max_triangles=np.int64(7)).digest() != RECIPE.digest()
-    for name, value in {"max_triangles": 0, "params": {}, "view": "z", "scan": 3, "strict": 1}.items():
-        with pytest.raises(rel.ParameterError, match=f"{name} must be"):
-            dataclasses.replace(RECIPE, **{name: value})
 
 
 @pytest.fixture
@@ -152,13 +143,6 @@ def test_what_strict_refuses_is_removed_with_all_its_files(tmp_path, task):
     assert [path.name for path in folder.rglob("*") if path.is_file()] == ["other.ply"]
 
 
-@pytest.mark.parametrize("name", ["strict", "certificates"])
-def test_the_same_reliefs_with_or_without(name):
-    assert dataclasses.replace(RECIPE, **{name: True}).digest() == RECIPE.digest()
-    with pytest.raises(rel.ParameterError, match=f"{name} must be True or False. Got 'no' instead"):
-        dataclasses.replace(RECIPE, **{name: "no"})
-
-
 def test_a_file_that_has_cost_two_workers_is_not_begun_again(tmp_path, task):
     notes = Notes(tmp_path)
     notes.begin(task.input)
@@ -171,18 +155,3 @@ def test_a_file_that_has_cost_two_workers_is_not_begun_again(tmp_path, task):
     assert not entry.made
     assert "was lost 2 times" in entry.error
     assert notes.attempts(task.input) == 0
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"params": rel.ReliefParams(k=5, in_order=False)},
-        {"view": rel.View(front="x")},
-        {"scan": rel.ScanParams(max_hole=9.0)},
-        {"ending": ".obj"},
-        {"max_triangles": 10},
-    ],
-)
-def test_every_part_of_the_recipe_counts(change):
-    assert dataclasses.replace(RECIPE, **change).digest() != RECIPE.digest()
-    assert dataclasses.replace(RECIPE).digest() == RECIPE.digest()

@@ -540,12 +540,28 @@ def test_dry_run_refuses_a_solid_of_what_is_flat_where_it_is_seen(tmp_path, caps
 
 
 @pytest.mark.parametrize("option", ["--undercut-free", "--height-map"])
-def test_dry_run_refuses_too_many_pixels(tmp_path, scene, capsys, option):
+def test_too_many_pixels_are_refused_before_the_work(tmp_path, scene, capsys, monkeypatch, option):
+    monkeypatch.setattr("o3d_relief.pipeline.make_relief", lambda *_, **__: pytest.fail("a relief was made"))
     words = ["--width-mm", "2000", "--base-mm", "50", "--mm-per-pixel", "0.01", option]
     words += [tmp_path / "h.png"] if option == "--height-map" else []
-    told = _fails(capsys, "make", scene, tmp_path / "s.stl", "--dry-run", *words)
+    told = _fails(capsys, "make", scene, tmp_path / "s.stl", *words)
     assert "--mm-per-pixel must be larger: 0.01 makes about 200000 x " in told
-    assert "size " not in told
+    assert _fails(capsys, "make", scene, tmp_path / "s.stl", "--dry-run", *words) == told
+
+
+def test_pixels_without_memory_are_refused_before_the_work(tmp_path, scene, capsys, monkeypatch):
+    command = ["make", scene, tmp_path / "s.stl", "--width-mm", "100", "--mm-per-pixel", "0.03"]
+    free = [*command, "--undercut-free"]
+    assert main([str(word) for word in [*free, "--dry-run"]]) == 0
+    told = float(capsys.readouterr().err.split("memory    about ")[1].split()[0])
+    assert told > 5.0  # 0.6 GB would be those of the relief alone
+    monkeypatch.setattr("o3d_relief.limits.available_memory", lambda: 4 * 2**30)
+    monkeypatch.setattr("o3d_relief.pipeline.make_relief", lambda *_, **__: pytest.fail("a relief was made"))
+    refused = _fails(capsys, *free)
+    assert "--mm-per-pixel must be larger: 0.03 makes about 3334 x " in refused
+    assert refused.endswith(" GB of memory and 4.0 GB are free.")
+    assert _fails(capsys, *free, "--dry-run") == refused
+    assert main([str(word) for word in [*command, "--height-map", tmp_path / "h.png", "--dry-run"]]) == 0
 
 
 def test_more_triangles_than_usual_where_they_are_asked_for(tmp_path, scene, capsys, monkeypatch):
@@ -618,3 +634,12 @@ def test_a_picture_of_the_walls(tmp_path, scene):
     out = tmp_path / "walls.png"
     assert main(["make", str(scene), str(tmp_path / "r.ply"), "-k", "16", "--walls", str(out)]) == 0
     assert out.read_bytes()[:4] == b"\x89PNG"
+
+
+def test_print_checks_name_options_as_they_are_typed(tmp_path, capsys):
+    ball = o3d.geometry.TriangleMesh.create_sphere(3.0, 12).translate((0, 0, 20))
+    both = o3d.geometry.TriangleMesh.create_box(30, 30, 5).translate((-15, -15, 0)) + ball
+    write_mesh(tmp_path / "both.obj", both)
+    command = ["make", str(tmp_path / "both.obj"), str(tmp_path / "s.stl"), "-k", "8", "--width-mm", "50"]
+    assert main(command) == 0
+    assert "--loose bridge ties them, --loose remove leaves them out." in capsys.readouterr().err

@@ -13,7 +13,7 @@ import pytest
 from o3d_relief import files as files_module
 from o3d_relief.cli import main
 from o3d_relief.errors import FileError
-from o3d_relief.files import check_exists, check_place, remove_files, write_bytes, write_files
+from o3d_relief.files import check_exists, check_folder, check_place, remove_files, write_bytes, write_files
 from shapes import bust, to_mesh
 
 POSIX = pytest.mark.skipif(os.name != "posix", reason="signals and limits of POSIX")
@@ -228,3 +228,30 @@ def test_files_are_removed(tmp_path):
     (tmp_path / "folder").mkdir()
     with pytest.raises(FileError, match="folder cannot be removed: "):
         remove_files(tmp_path / "folder", [])
+
+
+def test_folders_are_checked(tmp_path, monkeypatch):
+    (tmp_path / "file").touch()
+    check_folder(tmp_path)
+    check_folder(tmp_path / "new" / "newer")
+    monkeypatch.chdir(tmp_path)
+    check_folder("new")
+    assert names(tmp_path) == ["file"]
+    with pytest.raises(FileError, match=r"^file is a file, not a folder: choose another place"):
+        check_folder("file")
+    with pytest.raises(FileError, match=r"folder file.new cannot be made, .*file is a file, not a folder"):
+        check_folder(Path("file") / "new")
+    with pytest.raises(FileError, match=r"The folder nnn.* cannot be made: "):
+        check_folder(5000 * "n")
+    monkeypatch.setattr(os, "access", lambda *_: False)  # root may write everywhere
+    with pytest.raises(FileError, match=r"^The folder .* is read-only: choose another place"):
+        check_folder(tmp_path)
+    with pytest.raises(FileError, match=r"^The folder new cannot be made, .* is read-only: choose another"):
+        check_folder("new")
+
+
+def test_pictures_that_cannot_be_written_are_refused_before_the_work(scene, capsys, monkeypatch):
+    monkeypatch.setattr("o3d_relief.pipeline.make_relief", lambda *_, **__: pytest.fail("a relief was made"))
+    stages = scene / "stages"
+    assert main(["make", str(scene), str(scene.with_name("r.ply")), "--stages", str(stages)]) == 2
+    assert f"The folder {stages} cannot be made, {scene} is a file" in capsys.readouterr().err

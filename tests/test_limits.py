@@ -79,6 +79,20 @@ def test_points_that_are_thinned_need_less(monkeypatch):
     mesh_from_points(cloud, ScanParams(max_points=3999))
 
 
+def test_pixels(monkeypatch):
+    limits.check_field(100, 100, 0.5, solid=True)
+    with pytest.raises(
+        ParameterError, match=r"0\.5 makes 8000 x 5001 pixels of this piece, more than 40,000,000"
+    ):
+        limits.check_field(8000, 5001, 0.5)
+    monkeypatch.setattr(limits, "available_memory", lambda: 2 * 2**30)
+    limits.check_field(3000, 3000, 0.5)
+    with pytest.raises(
+        ParameterError, match=r"about 3000 x 3000 .* need about 10\.1 GB of memory and 2\.0 GB"
+    ):
+        limits.check_field(3000, 3000, 0.5, about=True, solid=True)
+
+
 @pytest.mark.parametrize("most", [0, -1, 2.5, True, "many"])
 def test_what_is_no_number_of_triangles(most):
     with pytest.raises(ParameterError, match="max_triangles must be a whole number, at least 1"):

@@ -103,6 +103,10 @@ def test_a_piece_that_fits_is_not_cut(tmp_path, scene, capsys):
             "--tool-mm must be smaller than the piece, which is 150 mm",
         ),
         (
+            ["--undercut-free", "--mm-per-pixel", "150"],
+            "--mm-per-pixel must be smaller than the piece, which is 150 mm wide. Got 150 instead.",
+        ),
+        (
             ["--undercut-free", "--mm-per-pixel", "0"],
             "--mm-per-pixel must be greater than 0. Got 0.0 instead.",
         ),

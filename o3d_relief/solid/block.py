@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
+from o3d_relief.limits import check_field
 from o3d_relief.param_checks import check_kind
 from o3d_relief.solid.body import PLATE_COLOR, Solid
 from o3d_relief.solid.heights import HeightField
@@ -32,12 +33,14 @@ def solid_under(field: HeightField, solid: Solid) -> Solid:
     Raises
     ------
     ParameterError
-        Something else than a height field and a solid.
+        Something else than a height field and a solid, or too little memory for so many pixels.
     """
     check_kind("field", field, HeightField, "height_field")
     check_kind("solid", solid, Solid, "make_solid")
     import manifold3d
 
+    rows, columns = field.z.shape
+    check_field(columns, rows, field.mm_per_pixel, solid=True)
     thickness = float(np.nanmax(field.z)) - field.back + 1.0
     shadow = solid.to_manifold().project().to_polygons()  # polygons that overlap
     outline = manifold3d.CrossSection(shadow, manifold3d.FillRule.Positive)

@@ -80,8 +80,8 @@ def joined(whole: manifold3d.Manifold, params: PlateParams) -> tuple[manifold3d.
             else {name: counts[name] for name in ("voids_filled", "crumbs")}
         )
         return result, {name: value + told.get(name, 0.0) for name, value in more.items()}
-    union, made_new = _swept(manifold3d.Manifold.batch_boolean(made, manifold3d.OpType.Add), params)
-    return union, counts | {"crumbs": counts["crumbs"] + made_new}
+    union, more = _swept(manifold3d.Manifold.batch_boolean(made, manifold3d.OpType.Add), params)
+    return union, counts | {name: counts[name] + count for name, count in more.items()}
 
 
 def _labelled(
@@ -100,14 +100,24 @@ def _crumbs(volumes: NDArray[np.float64], params: PlateParams) -> NDArray[np.boo
     return np.asarray((volumes > 0.0) & (volumes < params.nozzle_mm**3) & (volumes < volumes.max()))
 
 
-def _swept(whole: manifold3d.Manifold, params: PlateParams) -> tuple[manifold3d.Manifold, float]:
-    """Leave out the crumbs that a union has made; return their number, too."""
-    properties, corners, target, label = _labelled(whole)
-    volumes, _ = _measured(properties[:, :3], corners, label)
-    crumb = _crumbs(volumes, params)
-    if not crumb.any():
-        return whole, 0.0
-    return _only(properties, corners, target, ~crumb[label]), float(crumb.sum())
+def _swept(whole: manifold3d.Manifold, params: PlateParams) -> tuple[manifold3d.Manifold, dict[str, float]]:
+    """Leave out the crumbs that a union has made, and fill its voids; return their numbers, too.
+
+    Where there are several bodies, one may lie in a void: then only those of a crumb's size are filled.
+    """
+    counts = {"voids_filled": 0.0, "crumbs": 0.0}
+    while True:
+        properties, corners, target, label = _labelled(whole)
+        volumes, _ = _measured(properties[:, :3], corners, label)
+        crumb, void = _crumbs(volumes, params), volumes <= 0.0
+        if (volumes > 0.0).sum() - crumb.sum() > 1:
+            void &= -volumes < params.nozzle_mm**3
+        if not (crumb | void).any():
+            return whole, counts
+        counts["voids_filled"] += float(void.sum())
+        counts["crumbs"] += float(crumb.sum())
+        # manifold3d may part what touched itself in a vertex only: then there are new ones.
+        whole = _only(properties, corners, target, ~(crumb | void)[label])
 
 
 def _measured(

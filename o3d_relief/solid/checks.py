@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from o3d_relief.param_checks import check_kind
 from o3d_relief.plate_params import PlateParams
@@ -28,6 +29,12 @@ _FLAT_TOLERANCE = 1e-6
 """Millimetres between the back and its plane."""
 _THIN_SHARE = 1e-3
 """Share of the surface that may be thinner than the smallest wall: edges are."""
+_ADVICE = {
+    "report": ": loose='bridge' ties them, loose='remove' leaves them out",
+    "bridge": ", and nothing lies behind them to tie them to: loose='remove' leaves them out",
+    "remove": "",
+}
+"""What can be done about loose parts, by what was asked for already."""
 _OVERLAP_SHARE = 1e-3
 """Share of the volume that may be covered twice."""
 
@@ -48,7 +55,7 @@ class SolidReport:
     watertight, oriented : bool
         Every edge has exactly two faces; they turn the same way round.
     bodies : int
-        Connected parts; 1 is one piece.
+        Connected parts, without voids; 1 is one piece.
     back_deviation_mm : float
         Largest distance of the back's corners from its plane, -1 where nothing lies in it.
     overlap_share : float
@@ -112,6 +119,7 @@ def check_solid(solid: Solid, params: PlateParams) -> SolidReport:
     normals = np.cross(b - a, c - a) / 2.0
     area = np.linalg.norm(normals, axis=1)
     _, share, walls = walls_sampled(solid)
+    volumes = _volumes(vertices, faces)
     values: dict[str, Any] = {
         "size_mm": tuple(float(length) for length in solid.size),
         "volume_mm3": solid.volume,
@@ -119,7 +127,7 @@ def check_solid(solid: Solid, params: PlateParams) -> SolidReport:
         "triangles": len(faces),
         "watertight": watertight,
         "oriented": oriented,
-        "bodies": int(bodies(faces).max()) + 1,
+        "bodies": len(volumes),
         "back_deviation_mm": back_deviation(vertices, faces, normals, params),
         "overlap_share": overlap_share(vertices, faces),
         "thinnest_mm": quantile(walls, share, 1e-3),
@@ -127,9 +135,16 @@ def check_solid(solid: Solid, params: PlateParams) -> SolidReport:
         "overhang_area_mm2": overhang_area(vertices, faces, normals, area, params),
         "counts": dict(solid.counts),
     }
-    failures, warnings = _failures(values, params), _warnings(values, params)
+    failures, warnings = _failures(values, params), _warnings(values, params, sum(volumes[:-1]))
     verdict = "fail" if failures else "warnings" if warnings else "pass"
     return SolidReport(verdict=verdict, failures=failures, warnings=warnings, **values)
+
+
+def _volumes(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> list[float]:
+    """Return the volumes of the connected parts, the largest last; voids, which have none, are left out."""
+    a, b, c = vertices[faces].transpose(1, 0, 2)
+    volumes = np.bincount(bodies(faces), weights=np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0)
+    return [float(volume) for volume in np.sort(volumes[volumes > 0.0])]
 
 
 def _failures(values: dict[str, Any], params: PlateParams) -> tuple[str, ...]:
@@ -151,13 +166,11 @@ def _failures(values: dict[str, Any], params: PlateParams) -> tuple[str, ...]:
     return tuple(failures)
 
 
-def _warnings(values: dict[str, Any], params: PlateParams) -> tuple[str, ...]:
+def _warnings(values: dict[str, Any], params: PlateParams, loose_mm3: float) -> tuple[str, ...]:
     warnings = []
     if values["bodies"] > 1:
-        counts = values["counts"]
         warnings.append(
-            f"{values['bodies'] - 1} parts touch nothing, {counts.get('loose_mm3', 0.0):.0f} mm3 in all: "
-            "loose='bridge' ties them, loose='remove' leaves them out."
+            f"{values['bodies'] - 1} parts touch nothing, {loose_mm3:.0f} mm3 in all{_ADVICE[params.loose]}."
         )
     if values["thin_area_mm2"] > _THIN_SHARE * values["area_mm2"]:
         warnings.append(

@@ -17,7 +17,7 @@ from o3d_relief.scene.frame import to_relief_units
 from o3d_relief.solid.sizes import check_extents, scale_for
 from o3d_relief.steps import frame_step, perspective_step, visibility_step, visible_depth
 
-__all__ = ["Estimate", "estimate_relief", "estimate_solid", "relief_depth"]
+__all__ = ["Estimate", "estimate_relief", "estimate_solid", "front_size", "relief_depth"]
 
 _LINES = 256
 """Lines along x and along y that measure how high the scene stands."""
@@ -95,12 +95,12 @@ def estimate_solid(
     if plate.depth_mm is not None:
         depth, known = plate.depth_mm - plate.back_mm, True
     covered, mean_height = _front(vertices, faces)
-    total_height = (plate.width_mm - 2.0 * plate.edge_mm) * height / width + 2.0 * plate.edge_mm
+    total_height = _total_height(used, plate)
     share = {"rectangle": 1.0, "ellipse": np.pi / 4.0, "contour": covered, "none": 0.0}[plate.shape]
     volume = plate.width_mm * total_height * share * plate.back_mm
     volume += width * height * covered * mean_height * depth * (_BOUNDED if params.bounded else _ATTENUATED)
     return Estimate(
-        size=(plate.width_mm, float(total_height), float(depth + plate.back_mm)),
+        size=(plate.width_mm, total_height, float(depth + plate.back_mm)),
         visible_depth=seen_depth,
         depth_known=known,
         volume_mm3=float(volume),
@@ -161,6 +161,41 @@ def _seen_depth(vertices: NDArray[np.float64], faces: NDArray[np.int64], unit: f
 
 def _memory_mb(faces: NDArray[np.int64]) -> float:
     return _MEGABYTES + _BYTES_PER_TRIANGLE * len(faces) / 1e6
+
+
+def front_size(
+    mesh: o3d.geometry.TriangleMesh, view: View, plate: PlateParams, *, max_triangles: int | None = None
+) -> tuple[float, float]:
+    """Estimate the solid's width and height in millimetres, which takes far less time than all of it.
+
+    Parameters
+    ----------
+    mesh : open3d.geometry.TriangleMesh
+    view : View
+    plate : PlateParams
+    max_triangles : int, optional
+        As in `make_relief`.
+
+    Returns
+    -------
+    width, height : float
+        As in `Estimate.size`.
+
+    Raises
+    ------
+    MeshError
+        A mesh from which no relief, or no solid, can be made.
+    """
+    vertices, faces, _ = _seen(mesh, view, max_triangles)
+    used = vertices[np.unique(faces)]
+    check_extents(used)
+    return plate.width_mm, _total_height(used, plate)
+
+
+def _total_height(used: NDArray[np.float64], plate: PlateParams) -> float:
+    """Return the height of the whole object, margin and frame included, in millimetres."""
+    width, height, _ = np.ptp(used, axis=0)
+    return float((plate.width_mm - 2.0 * plate.edge_mm) * height / width + 2.0 * plate.edge_mm)
 
 
 def relief_depth(

@@ -9,14 +9,13 @@ import open3d as o3d
 from numpy.typing import NDArray
 
 from o3d_relief.errors import ParameterError
+from o3d_relief.limits import check_field
 from o3d_relief.param_checks import check_kind, check_positive
 from o3d_relief.rays import unit_box
 from o3d_relief.solid.body import PLATE_COLOR, Solid
 
 __all__ = ["HeightField", "check_pixels", "height_field"]
 
-_MOST_PIXELS = 40_000_000
-"""Of a height field: about 8 GB of memory."""
 _RAYS_AT_ONCE = 2_000_000
 _BESIDE = ((1e-6, 1e-6), (-1e-6, 1e-6), (-1e-6, -1e-6), (1e-6, -1e-6))
 """Where a ray that has slipped through is cast again, as shares of the solid's size."""
@@ -77,8 +76,10 @@ class HeightField:
         return replace(self, z=np.where(np.isfinite(z), z, np.nan))
 
 
-def check_pixels(width: float, height: float, mm_per_pixel: float, *, about: bool = False) -> tuple[int, int]:
-    """Return the columns and rows of the height field of a piece, and refuse more than 40 million pixels.
+def check_pixels(
+    width: float, height: float, mm_per_pixel: float, *, about: bool = False, solid: bool = False
+) -> tuple[int, int]:
+    """Return the columns and rows of the height field of a piece, and refuse too many.
 
     Parameters
     ----------
@@ -87,18 +88,16 @@ def check_pixels(width: float, height: float, mm_per_pixel: float, *, about: boo
     mm_per_pixel : float
     about : bool
         Whether the size is an estimate, which the sentence then says.
+    solid : bool
+        Whether a solid is to be made of what lies under the field.
 
     Raises
     ------
     ParameterError
-        Too many pixels.
+        More than 40 million pixels, or too little memory for them.
     """
     columns, rows = (max(1, int(np.ceil(side / mm_per_pixel - 1e-9))) for side in (width, height))
-    if rows * columns > _MOST_PIXELS:
-        raise ParameterError(
-            f"mm_per_pixel must be larger: {mm_per_pixel:g} makes {'about ' if about else ''}{columns} x "
-            f"{rows} pixels of this piece, more than {_MOST_PIXELS:,}."
-        )
+    check_field(columns, rows, mm_per_pixel, about=about, solid=solid)
     return columns, rows
 
 

@@ -2,10 +2,11 @@ import numpy as np
 import pytest
 import trimesh
 
+from o3d_relief.errors import ParameterError
 from o3d_relief.solid.block import solid_under
 from o3d_relief.solid.body import Solid
 from o3d_relief.solid.heights import height_field
-from slabs import ball_on_slab, plate
+from slabs import ball_on_slab, plate, slab
 
 
 @pytest.mark.parametrize("colored", [False, True])
@@ -47,3 +48,10 @@ def test_outline_is_cut_exactly():
     made = solid_under(height_field(corner, 1.0), corner)
     assert made.volume == pytest.approx(corner.volume, rel=1e-6)
     np.testing.assert_allclose(made.size, corner.size, atol=1e-6)
+
+
+def test_a_solid_that_needs_too_much_memory_is_refused(monkeypatch):
+    field = height_field(slab(), 0.05)
+    monkeypatch.setattr("o3d_relief.limits.available_memory", lambda: 2**29)
+    with pytest.raises(ParameterError, match=r"0\.05 makes 1200 x 800 .* 1\.1 GB of memory and 0\.5 GB are"):
+        solid_under(field, slab())

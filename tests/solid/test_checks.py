@@ -50,6 +50,28 @@ def test_thin_walls_warn():
     assert "1 parts touch nothing" in report.warnings[0]
 
 
+@pytest.mark.parametrize(
+    ("loose", "advice"),
+    [
+        ("report", "in all: loose='bridge' ties them, loose='remove' leaves them out."),
+        ("bridge", "in all, and nothing lies behind them to tie them to: loose='remove' leaves them out."),
+        ("remove", "in all."),
+    ],
+)
+def test_only_what_is_loose_is_told_and_what_can_still_be_done(loose, advice):
+    hollow = _box([-5, -5, -1], [5, 5, 3])
+    hollow.invert()
+    block = trimesh.util.concatenate([_box([-20, -10, -4], [20, 10, 5]), hollow])
+    params = PlateParams(width_mm=40, depth_mm=9, loose=loose)
+    alone = check_solid(_solid(block), params)
+    assert alone.bodies == 1  # a void is no part
+    assert "touch nothing" not in " ".join(alone.warnings)
+    params = PlateParams(width_mm=40, depth_mm=13, loose=loose)
+    report = check_solid(_solid(trimesh.util.concatenate([block, _box([0, 0, 7], [2, 5, 9])])), params)
+    assert report.bodies == 2
+    assert report.warnings[0] == f"1 parts touch nothing, 20 mm3 {advice}"
+
+
 @pytest.mark.parametrize(("direction", "area"), [("z", 200.0), ("y", 30.0), ("x", 30.0)])
 def test_overhangs_in_each_print_direction(direction, area):
     # A table: its underside needs support when it stands on its back, its foot's side when it lies.

@@ -3,7 +3,7 @@ import pytest
 
 import o3d_relief as rel
 from o3d_relief.plate_params import PlateParams
-from o3d_relief.solid.estimate import estimate_relief, estimate_solid, relief_depth
+from o3d_relief.solid.estimate import estimate_relief, estimate_solid, front_size, relief_depth
 from shapes import bust, moved, to_mesh
 
 
@@ -24,6 +24,7 @@ def test_the_solid_measures_what_was_said(scene, shape):
     assert found.volume_mm3 == pytest.approx(solid.volume, rel=0.4)
     assert 0.95 < solid.counts["depth_ratio"] < 1.05  # the relief itself is as deep as it has to be
     assert found.memory_mb > 500
+    assert front_size(scene, view, plate) == found.size[:2]
 
 
 def test_without_a_depth_it_is_at_most_that_of_the_scene(scene):

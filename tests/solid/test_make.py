@@ -10,7 +10,7 @@ import o3d_relief as rel
 from o3d_relief.errors import MeshError, ParameterError
 from o3d_relief.plate_params import PlateParams
 from o3d_relief.scene.arrays import MeshArrays
-from o3d_relief.solid.bodies import joined
+from o3d_relief.solid.bodies import _swept, joined
 from o3d_relief.solid.body import PLATE_COLOR
 from o3d_relief.solid.checks import check_solid
 from o3d_relief.solid.make import solid_of
@@ -88,6 +88,23 @@ def test_what_floats_is_reported_bridged_or_removed():
     assert report.bodies == 1
     assert bridged.counts["pins"] == 1
     assert bridged.volume > kept.volume
+
+
+def _cube(side, place=(0, 0, 0)):
+    return manifold3d.Manifold.cube([side] * 3, True).translate(place)
+
+
+def test_what_a_union_leaves_is_swept():
+    params, block = PlateParams(), _cube(20) - _cube(5)
+    filled, counts = _swept(block + _cube(0.1, (30, 0, 0)), params)
+    assert counts == {"voids_filled": 1.0, "crumbs": 1.0}
+    assert filled.volume() == pytest.approx(8000.0)
+    # The cube in the void would be lost with it.
+    nested, counts = _swept((block - _cube(0.1, (8, 0, 0))) + _cube(2), params)
+    assert counts == {"voids_filled": 1.0, "crumbs": 0.0}
+    assert nested.volume() == pytest.approx(8000.0 - 125.0 + 8.0)
+    clean = _cube(20)
+    assert _swept(clean, params)[0] is clean
 
 
 def test_a_part_that_touches_the_plate_with_a_flat_face_is_one_with_it():

@@ -1,0 +1,98 @@
+"""One batch at a time in a folder."""
+
+from __future__ import annotations
+
+import errno
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from o3d_relief.errors import FileError
+
+__all__ = ["LOCK", "sole_batch"]
+
+LOCK = ".o3d-relief.lock"
+"""The file that a running batch holds."""
+
+_HELD = (errno.EACCES, errno.EAGAIN, errno.EDEADLK)
+_NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP)
+
+
+@contextmanager
+def sole_batch(folder: Path) -> Iterator[None]:
+    """Keep other batches out of a folder while the block runs.
+
+    Two batches would take each other's notes and unfinished files for what a killed one has left, and give
+    one name to two reliefs. The system holds the lock, and gives it up when the process ends, however it
+    ends. On a file system that knows no locks nobody is kept out.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the batch; must exist. It holds a small file during the block.
+
+    Raises
+    ------
+    FileError
+        Another batch is under way there, or nothing can be written there.
+    """
+    try:
+        descriptor = _locked(folder / LOCK)
+    except OSError as error:
+        raise FileError(
+            f"Nothing can be written in the folder {folder}: {error.strerror}. Choose another one."
+        ) from error
+    if descriptor is None:
+        raise FileError(
+            f"Another batch is under way in the folder {folder}: wait until it has ended, or choose another "
+            "folder."
+        )
+    try:
+        yield
+    finally:
+        (folder / LOCK).unlink(missing_ok=True)  # before it is given up: nobody else's goes
+        os.close(descriptor)
+
+
+def _locked(path: Path) -> int | None:
+    """Return the descriptor of a file that this batch alone holds, None where another does."""
+    while True:
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_TEMPORARY", 0), 0o666)
+        try:
+            held = _lock(descriptor)
+            # Between the two steps the other batch may have ended, and taken the file with it.
+            if held and _is_there(path, descriptor):
+                return descriptor
+        except BaseException:
+            os.close(descriptor)
+            raise
+        os.close(descriptor)
+        if not held:
+            return None
+
+
+def _is_there(path: Path, descriptor: int) -> bool:
+    try:
+        return os.path.samestat(os.fstat(descriptor), path.stat())
+    except FileNotFoundError:
+        return False
+
+
+def _lock(descriptor: int) -> bool:
+    """Lock a file without waiting; return whether that went well."""
+    try:
+        if sys.platform == "win32":
+            import msvcrt
+
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl
+
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        if error.errno not in _HELD + _NO_LOCKS:
+            raise
+        return error.errno in _NO_LOCKS
+    return True
