@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterable
 from contextlib import AbstractContextManager, closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -51,7 +51,7 @@ class Batch:
 
 
 def make_reliefs(
-    inputs: Sequence[str | Path],
+    inputs: Iterable[str | Path],
     out: str | Path,
     params: ReliefParams | None = None,
     *,
@@ -77,7 +77,7 @@ def make_reliefs(
 
     Parameters
     ----------
-    inputs : sequence of path
+    inputs : iterable of path
         Meshes and point clouds. A folder stands for all files in it that can be read.
     out : path
         Folder, which is made where it is missing; on a cluster all workers must see it, and the inputs, by

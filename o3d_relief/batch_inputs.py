@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from o3d_relief.batch_manifest import BatchEntry
@@ -12,12 +12,12 @@ from o3d_relief.errors import FileError, ParameterError
 __all__ = ["find_inputs", "output_names"]
 
 
-def find_inputs(inputs: Sequence[str | Path]) -> list[str]:
+def find_inputs(inputs: Iterable[str | Path]) -> list[str]:
     """Return the files, each once.
 
     Parameters
     ----------
-    inputs : sequence of path
+    inputs : iterable of path
         A folder stands for all files in it that can be read, by name.
 
     Returns
@@ -34,14 +34,18 @@ def find_inputs(inputs: Sequence[str | Path]) -> list[str]:
     """
     from o3d_relief.scene.read import READABLE, READABLE_CLOUDS
 
-    if isinstance(inputs, str | Path) or len(inputs) == 0:
+    try:
+        places = [] if isinstance(inputs, str | Path) else [Path(place) for place in inputs]
+    except TypeError:
+        places = []
+    if not places:
         raise ParameterError(f"inputs must be a sequence of files, at least one. Got {inputs!r} instead.")
     # Path.exists would raise for names that are too long.
-    if not any(os.path.exists(place) for place in inputs):  # noqa: PTH110
-        rest = "" if len(inputs) == 1 else ", nor is any other of the inputs there"
-        raise FileError(f"There is no file or folder {inputs[0]}{rest}: check the name.")
+    if not any(os.path.exists(place) for place in places):  # noqa: PTH110
+        rest = "" if len(places) == 1 else ", nor is any other of the inputs there"
+        raise FileError(f"There is no file or folder {places[0]}{rest}: check the name.")
     found: list[Path] = []
-    for place in map(Path, inputs):
+    for place in places:
         if not place.is_dir():
             found.append(place)
             continue

@@ -269,6 +269,11 @@ def measure_relief(
     -------
     ReliefQuality
 
+    Raises
+    ------
+    MeshError, ParameterError
+        As `Yardstick` and its `measure`.
+
     Examples
     --------
     >>> ball = o3d.geometry.TriangleMesh.create_sphere()

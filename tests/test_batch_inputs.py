@@ -22,9 +22,16 @@ def test_no_inputs(tmp_path):
         find_inputs([tmp_path])
     with pytest.raises(FileError, match=r"There is no file or folder a.ply, nor is any other"):
         find_inputs(["a.ply", tmp_path / "b.ply"])
-    for wrong in ([], "scan.ply", Path("scan.ply")):
+    for wrong in ([], "scan.ply", Path("scan.ply"), None, 5, [5], [None], tmp_path.glob("*.ply")):
         with pytest.raises(ParameterError, match="inputs must be a sequence of files, at least one"):
             find_inputs(wrong)
+
+
+def test_what_a_folder_is_searched_for_need_not_be_a_list(tmp_path):
+    for name in ("a.ply", "b.ply", "c.obj"):
+        (tmp_path / name).touch()
+    found = find_inputs(tmp_path.glob("*.ply"))
+    assert sorted(Path(path).name for path in found) == ["a.ply", "b.ply"]
 
 
 def test_two_files_with_one_name_have_two_reliefs():
