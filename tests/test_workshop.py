@@ -78,6 +78,7 @@ def test_tiles_are_written_instead_of_the_whole(tmp_path, scene, capsys):
         np.testing.assert_allclose(tile.extents, size, atol=0.01)
     err = capsys.readouterr().err
     assert f"{told['tiles']} tiles in" in err
+    assert "seams cut" not in err  # nothing hangs
     assert f"{tmp_path / names[0]} to {names[-1]}: {told['tiles']} tiles, " in err
     assert _run("make", scene, out, *SMALL) == 0
     whole = trimesh.load(out)

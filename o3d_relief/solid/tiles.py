@@ -211,7 +211,9 @@ def _cut_pockets(
     for share in _POCKET_SLICES[1:]:
         inner = (_enclosed(whole.slice(share * back)) ^ front).decompose()
         pockets = sum((one for one in inner if (one ^ pockets).area() > _LEAST_POCKET), pockets)
-    bounds = np.array([one.bounds() for one in pockets.decompose()]).reshape(-1, 4)
+    # Nothing is decomposed into one empty part, without bounds.
+    found = [one.bounds() for one in pockets.decompose() if one.area() > _LEAST_POCKET]
+    bounds = np.array(found).reshape(-1, 4)
     cut = np.zeros(len(bounds), dtype=bool)
     for axis, seams in enumerate((x[1:-1], y[1:-1])):
         begin, end = bounds[:, axis, None], bounds[:, axis + 2, None]

@@ -49,6 +49,11 @@ def test_seams_through_a_keyhole_are_counted(hung, width, height, cut):
     assert make_tiles(hung, TileParams(width_mm=width, height_mm=height)).counts["pockets_cut"] == cut
 
 
+def test_a_back_without_a_hole_has_none_to_cut(large):
+    counts = make_tiles(large, TileParams(width_mm=170, height_mm=120)).counts
+    assert (counts["tiles"], counts["pockets_cut"]) == (4, 0)
+
+
 def test_tiles_are_closed_and_fit_the_printer(large):
     tiling = make_tiles(large, TileParams(width_mm=170, height_mm=120))
     assert [tile.number for tile in tiling.tiles] == [1, 2, 3, 4]
