@@ -91,13 +91,17 @@ def check_folder(path: str | Path) -> None:
     Raises
     ------
     FileError
-        A file in its place or above it, or no right to write there.
+        A file in its place or above it, no right to write there, or a drive that is not there.
     """
     path = Path(path)
     try:
-        there = next(place for place in (path, *path.absolute().parents) if place.exists())
+        there = next((place for place in (path, *path.absolute().parents) if place.exists()), None)
     except OSError as error:  # a name that is too long, a folder that may not be entered
         raise FileError(f"The folder {path} cannot be made: {error.strerror}.") from error
+    if there is None:  # a drive that is not mounted
+        raise FileError(
+            f"The folder {path} cannot be made, there is no {path.absolute().anchor}: choose another place."
+        )
     if not there.is_dir():
         words = "" if there == path else f"The folder {path} cannot be made, "
         raise FileError(f"{words}{there} is a file, not a folder: choose another place.")

@@ -250,6 +250,12 @@ def test_folders_are_checked(tmp_path, monkeypatch):
         check_folder("new")
 
 
+def test_a_folder_on_a_drive_that_is_not_there(tmp_path, monkeypatch):
+    monkeypatch.setattr(Path, "exists", lambda _: False)
+    with pytest.raises(FileError, match=r"new cannot be made, there is no .*: choose another place"):
+        check_folder(tmp_path / "new")
+
+
 def test_pictures_that_cannot_be_written_are_refused_before_the_work(scene, capsys, monkeypatch):
     monkeypatch.setattr("o3d_relief.pipeline.make_relief", lambda *_, **__: pytest.fail("a relief was made"))
     stages = scene / "stages"
