@@ -6,7 +6,7 @@ import errno
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from o3d_relief.errors import FileError
@@ -36,11 +36,18 @@ def sole_batch(folder: Path) -> Iterator[None]:
     Raises
     ------
     FileError
-        Another batch is under way there, or nothing can be written there.
+        Another batch is under way there, nothing can be written there, or the file that a killed one has left
+        cannot be locked.
     """
+    path = folder / LOCK
     try:
-        descriptor = _locked(folder / LOCK)
+        descriptor = _locked(path)
     except OSError as error:
+        if os.path.isfile(path):  # noqa: PTH113, which would raise where the folder may not be entered
+            raise FileError(
+                f"{path} cannot be locked: {error.strerror}. Remove it if no other batch is under way there, "
+                "or choose another folder."
+            ) from error
         raise FileError(
             f"Nothing can be written in the folder {folder}: {error.strerror}. Choose another one."
         ) from error
@@ -52,14 +59,23 @@ def sole_batch(folder: Path) -> Iterator[None]:
     try:
         yield
     finally:
-        (folder / LOCK).unlink(missing_ok=True)  # before it is given up: nobody else's goes
+        _let_go(path, descriptor)
+
+
+def _let_go(path: Path, descriptor: int) -> None:
+    """Give a lock up, and take its file away; one that may not be removed does no harm."""
+    if sys.platform == "win32":  # an open file cannot be removed: ours must be closed, others' stay
+        os.close(descriptor)
+    with suppress(OSError):
+        path.unlink(missing_ok=True)
+    if sys.platform != "win32":  # only now: nobody else's goes
         os.close(descriptor)
 
 
 def _locked(path: Path) -> int | None:
     """Return the descriptor of a file that this batch alone holds, None where another does."""
     while True:
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_TEMPORARY", 0), 0o666)
+        descriptor = _opened(path)
         try:
             held = _lock(descriptor)
             # Between the two steps the other batch may have ended, and taken the file with it.
@@ -71,6 +87,15 @@ def _locked(path: Path) -> int | None:
         os.close(descriptor)
         if not held:
             return None
+
+
+def _opened(path: Path) -> int:
+    try:
+        return os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+    except PermissionError:
+        if not os.path.isfile(path):  # noqa: PTH113
+            raise
+        return os.open(path, os.O_RDONLY)  # another user's; on most file systems that is enough for a lock
 
 
 def _is_there(path: Path, descriptor: int) -> bool:
