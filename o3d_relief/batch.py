@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager, closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from o3d_relief.batch_engine import Engine, open_engine
+from o3d_relief.batch_engine import Engine, check_engine, open_engine
 from o3d_relief.batch_inputs import find_inputs
 from o3d_relief.batch_lock import sole_batch
 from o3d_relief.batch_manifest import PICTURES, BatchEntry, Manifest, Notes
@@ -15,8 +15,8 @@ from o3d_relief.batch_recipe import BatchTask, Recipe, open_tasks
 from o3d_relief.batch_sheet import remove_sheets, write_sheets
 from o3d_relief.batch_task import MOST_ATTEMPTS, lost_entry
 from o3d_relief.errors import FileError, ParameterError, ReliefError
-from o3d_relief.files import clear_leftovers
-from o3d_relief.param_checks import check_whole, given
+from o3d_relief.files import check_folder, clear_leftovers
+from o3d_relief.param_checks import given
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.progress import OnProgress, Progress
 from o3d_relief.scan_params import ScanParams
@@ -123,7 +123,7 @@ def make_reliefs(
     Cancelled
         `on_progress` returned False.
     """
-    jobs = None if jobs is None else check_whole("jobs", jobs)
+    check_engine(engine, scheduler, jobs)
     recipe = Recipe(
         params=given("params", params, ReliefParams),
         view=given("view", view, View),
@@ -197,6 +197,8 @@ def _checked_ending(ending: str) -> str:
 
 def _made_folder(folder: Path) -> Path:
     """Make the folder of a batch; return its whole path."""
+    for place in (folder, folder / PICTURES):
+        check_folder(place)
     try:
         (folder / PICTURES).mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -35,7 +35,7 @@ def add_batch(command: argparse.ArgumentParser) -> None:
     add("--strict", action="store_true",
         help="refuse reliefs that do not keep what --certificates tests, and go on")  # fmt: skip
     add("--dry-run", action="store_true",
-        help="only tell, one after the other, what the reliefs will measure and which inputs would fail; "
-        "nothing is written")  # fmt: skip
+        help="only tell, one after the other, what the reliefs will measure and which inputs would fail, "
+        "but for what --strict would refuse; nothing is written")  # fmt: skip
     add("--max-triangles", type=int, metavar="N",
         help=f"refuse larger meshes (default: {MAX_TRIANGLES})")  # fmt: skip

@@ -79,10 +79,12 @@ def batch(options: argparse.Namespace) -> int:
 
 
 def _rehearse(options: argparse.Namespace, params: ReliefParams, view: View, scan: ScanParams) -> int:
-    """Tell what a batch would make; return the exit code that it would have."""
+    """Tell what a batch would make; return the exit code that it would have but for certificates."""
+    from o3d_relief.batch_engine import check_engine
     from o3d_relief.batch_recipe import Recipe
     from o3d_relief.batch_rehearsal import rehearse_reliefs
 
+    check_engine(options.engine, options.scheduler, options.jobs)
     recipe = Recipe(
         params=params,
         view=view,

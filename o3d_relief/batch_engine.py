@@ -13,8 +13,9 @@ from o3d_relief.batch_manifest import BatchEntry
 from o3d_relief.batch_recipe import BatchTask
 from o3d_relief.batch_task import MOST_ATTEMPTS, run_task
 from o3d_relief.errors import ParameterError, ReliefError
+from o3d_relief.param_checks import check_whole
 
-__all__ = ["ENGINES", "Engine", "open_engine"]
+__all__ = ["ENGINES", "Engine", "check_engine", "open_engine"]
 
 ENGINES = ("loky", "dask", "ray")
 
@@ -42,9 +43,30 @@ class Engine:
     lost: tuple[type[BaseException], ...]
 
 
+def check_engine(engine: str, scheduler: str | None, jobs: int | None) -> None:
+    """Check, before any work, what says where the tasks run.
+
+    Parameters
+    ----------
+    engine, scheduler, jobs
+        As of `open_engine`.
+
+    Raises
+    ------
+    ParameterError
+        Another engine, an address for one that has none, or a number of jobs that is not positive and whole.
+    """
+    if jobs is not None:
+        check_whole("jobs", jobs)
+    if engine not in ENGINES:
+        raise ParameterError(f"engine must be one of {', '.join(ENGINES)}. Got {engine!r} instead.")
+    if scheduler is not None and engine == "loky":
+        raise ParameterError("scheduler is the address of a cluster: it needs engine dask or ray.")
+
+
 @contextmanager
 def open_engine(engine: str, scheduler: str | None, jobs: int | None) -> Iterator[Engine]:
-    """Find the workers, and let them go in the end.
+    """Find the workers, and let them go in the end; `check_engine` comes first.
 
     Parameters
     ----------
@@ -56,15 +78,9 @@ def open_engine(engine: str, scheduler: str | None, jobs: int | None) -> Iterato
 
     Raises
     ------
-    ParameterError
-        An address for an engine that has none.
     ReliefError
         The engine is not installed, or its cluster does not answer.
     """
-    if engine not in ENGINES:
-        raise ParameterError(f"engine must be one of {', '.join(ENGINES)}. Got {engine!r} instead.")
-    if scheduler is not None and engine == "loky":
-        raise ParameterError("scheduler is the address of a cluster: it needs engine dask or ray.")
     with ExitStack() as stack:
         yield {"loky": _loky, "dask": _dask, "ray": _ray}[engine](scheduler, jobs, stack)
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from o3d_relief.errors import FileError
 
-__all__ = ["LOCK", "sole_batch"]
+__all__ = ["LOCK", "check_sole", "sole_batch"]
 
 LOCK = ".o3d-relief.lock"
 """The file that a running batch holds."""
@@ -39,10 +39,37 @@ def sole_batch(folder: Path) -> Iterator[None]:
         Another batch is under way there, nothing can be written there, or the file that a killed one has left
         cannot be locked.
     """
+    descriptor = _sole(folder, create=True)
+    try:
+        yield
+    finally:
+        _let_go(folder / LOCK, descriptor)
+
+
+def check_sole(folder: Path) -> None:
+    """Check that no other batch is under way in a folder; nothing is written.
+
+    Parameters
+    ----------
+    folder : Path
+        May be missing.
+
+    Raises
+    ------
+    FileError
+        As `sole_batch`.
+    """
+    with suppress(FileNotFoundError):
+        os.close(_sole(folder, create=False))
+
+
+def _sole(folder: Path, *, create: bool) -> int:
     path = folder / LOCK
     try:
-        descriptor = _locked(path)
+        descriptor = _locked(path, os.O_CREAT if create else 0)
     except OSError as error:
+        if not create and isinstance(error, FileNotFoundError):
+            raise
         if os.path.isfile(path):  # noqa: PTH113, which would raise where the folder may not be entered
             raise FileError(
                 f"{path} cannot be locked: {error.strerror}. Remove it if no other batch is under way there, "
@@ -56,10 +83,7 @@ def sole_batch(folder: Path) -> Iterator[None]:
             f"Another batch is under way in the folder {folder}: wait until it has ended, or choose another "
             "folder."
         )
-    try:
-        yield
-    finally:
-        _let_go(path, descriptor)
+    return descriptor
 
 
 def _let_go(path: Path, descriptor: int) -> None:
@@ -72,10 +96,10 @@ def _let_go(path: Path, descriptor: int) -> None:
         os.close(descriptor)
 
 
-def _locked(path: Path) -> int | None:
+def _locked(path: Path, create: int) -> int | None:
     """Return the descriptor of a file that this batch alone holds, None where another does."""
     while True:
-        descriptor = _opened(path)
+        descriptor = _opened(path, create)
         try:
             held = _lock(descriptor)
             # Between the two steps the other batch may have ended, and taken the file with it.
@@ -89,9 +113,9 @@ def _locked(path: Path) -> int | None:
             return None
 
 
-def _opened(path: Path) -> int:
+def _opened(path: Path, create: int) -> int:
     try:
-        return os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+        return os.open(path, os.O_RDWR | create, 0o666)
     except PermissionError:
         if not os.path.isfile(path):  # noqa: PTH113
             raise

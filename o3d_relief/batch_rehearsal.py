@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from o3d_relief.batch_inputs import find_inputs
-from o3d_relief.batch_manifest import read_entries
+from o3d_relief.batch_lock import check_sole
+from o3d_relief.batch_manifest import PICTURES, read_entries
 from o3d_relief.batch_recipe import BatchTask, Recipe, open_tasks
 from o3d_relief.batch_task import error_sentence, read_input
 from o3d_relief.files import check_folder
@@ -49,7 +50,7 @@ class Rehearsal:
 def rehearse_reliefs(inputs: Sequence[str | Path], out: str | Path, recipe: Recipe) -> Iterator[Rehearsal]:
     """Go through the inputs of a batch up to its long work, one after the other.
 
-    Point clouds are meshed: their sizes are not known before.
+    Point clouds are meshed: their sizes are not known before. What certificates would refuse is not.
 
     Parameters
     ----------
@@ -66,11 +67,13 @@ def rehearse_reliefs(inputs: Sequence[str | Path], out: str | Path, recipe: Reci
     Raises
     ------
     ParameterError, FileError
-        What `make_reliefs` would refuse.
+        What `make_reliefs` would refuse of inputs and folder.
     """
     sources = find_inputs(inputs)
-    check_folder(out)
+    for place in (Path(out), Path(out) / PICTURES):
+        check_folder(place)
     folder = Path(out).resolve()
+    check_sole(folder)
     names, tasks = open_tasks(sources, folder, read_entries(folder), recipe)
     waiting = {task.input: task for task in tasks}
     for source in sources:

@@ -115,7 +115,7 @@ def test_a_folder_that_cannot_be_made(tmp_path, capsys):
     for name in ("a.ply", "out"):
         (tmp_path / name).touch()
     assert main(["batch", str(tmp_path / "a.ply"), "--out", str(tmp_path / "out")]) == 2
-    assert "The folder" in capsys.readouterr().err
+    assert f"{tmp_path / 'out'} is a file, not a folder" in capsys.readouterr().err
 
 
 def test_inputs_that_are_not_there_leave_no_folder(tmp_path, capsys):

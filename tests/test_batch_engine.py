@@ -2,20 +2,21 @@ import sys
 
 import pytest
 
-from o3d_relief.batch_engine import open_engine
+from o3d_relief.batch_engine import check_engine, open_engine
 from o3d_relief.errors import ParameterError, ReliefError
 
 
 @pytest.mark.parametrize(
-    ("engine", "address", "sentence"),
+    ("engine", "address", "jobs", "sentence"),
     [
-        ("slurm", None, "must be one of loky, dask, ray"),
-        ("loky", "tcp://a:1", "needs engine dask or ray"),
+        ("slurm", None, 2, "must be one of loky, dask, ray"),
+        ("loky", "tcp://a:1", None, "needs engine dask or ray"),
+        ("dask", "tcp://a:1", 0, "jobs must be a whole number, at least 1"),
     ],
 )
-def test_wrong_engines(engine, address, sentence):
-    with pytest.raises(ParameterError, match=sentence), open_engine(engine, address, 2):
-        pass
+def test_wrong_engines(engine, address, jobs, sentence):
+    with pytest.raises(ParameterError, match=sentence):
+        check_engine(engine, address, jobs)
 
 
 @pytest.mark.parametrize(("engine", "module"), [("dask", "distributed"), ("ray", "ray")])

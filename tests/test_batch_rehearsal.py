@@ -6,6 +6,7 @@ import open3d as o3d
 import pytest
 
 import o3d_relief as rel
+from o3d_relief.batch_lock import sole_batch
 from o3d_relief.cli import main
 from shapes import sphere, to_mesh
 
@@ -100,12 +101,49 @@ def test_a_point_cloud_is_meshed(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    ("name", "sentence"), [("file", "is a file, not a folder"), ("other", "is not the manifest of a batch")]
+    ("name", "sentence"),
+    [
+        ("file", "is a file, not a folder"),
+        ("other", "is not the manifest of a batch"),
+        ("third", "pictures is a file, not a folder"),
+    ],
 )
 def test_folders_that_cannot_be_used(tmp_path, scans, capsys, name, sentence):
+    (tmp_path / "third").mkdir()
+    (tmp_path / "third" / "pictures").touch()
     (tmp_path / "file").touch()
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "manifest.jsonl").write_text(json.dumps({"a": 1}) + "\n")
     code, told = _told(capsys, scans, "--out", tmp_path / name, "--dry-run")
+    assert code == 2
+    assert sentence in told
+    assert sentence in _told(capsys, scans, "--out", tmp_path / name, "--jobs", "1")[1]
+
+
+def test_a_folder_in_which_a_batch_is_under_way(tmp_path, scans, capsys):
+    out = tmp_path / "out"
+    out.mkdir()
+    words = [scans / "ball.ply", "--out", out, "--dry-run"]
+    with sole_batch(out):
+        before = _files(tmp_path)
+        code, told = _told(capsys, *words)
+        assert _files(tmp_path) == before
+    assert code == 2
+    assert f"Another batch is under way in the folder {out}: wait" in told
+    assert _told(capsys, *words)[0] == 0
+    assert list(out.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["--jobs", "0"], "--jobs must be a whole number, at least 1"),
+        (["--scheduler", "tcp://h:1"], "--scheduler is the address of a cluster"),
+    ],
+)
+def test_workers_that_cannot_be_had(tmp_path, scans, capsys, words, sentence):
+    words = [scans, "--out", tmp_path / "out", *words]
+    code, told = _told(capsys, *words, "--dry-run")
+    assert (code, told) == _told(capsys, *words)
     assert code == 2
     assert sentence in told
