@@ -156,10 +156,10 @@ def _fill(
     progress: Progress,
 ) -> Batch:
     """Make what the folder has not, with the workers that `opened` calls."""
+    manifest = Manifest(folder)  # first: from here on, workers of a killed batch write no more
     for place in (folder, folder / PICTURES):
         clear_leftovers(place)
-    manifest = Manifest(folder)
-    _, tasks = open_tasks(sources, folder, manifest.entries, recipe)
+    _, tasks = open_tasks(sources, folder, manifest.entries, recipe, manifest.run)
     done = len(sources) - len(tasks)
     progress.begin("batch")
     progress.tick(done / len(sources))

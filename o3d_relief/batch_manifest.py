@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import secrets
 import shutil
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
@@ -17,7 +18,8 @@ __all__ = ["MANIFEST", "PICTURES", "BatchEntry", "Manifest", "Notes", "read_entr
 
 MANIFEST = "manifest.jsonl"
 PICTURES = "pictures"
-_NOTES = ".o3d-relief-batch"
+_NOTES = ".o3d-relief-batch-"
+"""Start of the name of the folder for notes; that of the batch follows."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,14 +129,34 @@ class Notes:
     A relief is noted with its checksum just before its file appears: whenever everything is killed, it is
     known afterwards which reliefs are done.
 
+    Workers may outlive a batch that is killed. The next one takes away the place where they note; without it
+    they neither note nor write anything.
+
     Parameters
     ----------
     folder : Path
         Of the batch.
+    run : str
+        Name of the batch, which no other one has.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder / _NOTES
+    def __init__(self, folder: Path, run: str) -> None:
+        self._folder = folder / f"{_NOTES}{run}"
+
+    def open(self) -> None:
+        """Make the place for notes; FileError where that cannot be."""
+        try:
+            self._folder.mkdir()
+        except OSError as error:
+            raise FileError(f"The folder {self._folder} cannot be made: {error.strerror}.") from error
+
+    def check(self) -> None:
+        """Check that the place is there still; FileError where it is not."""
+        if not self._folder.is_dir():
+            raise FileError(
+                f"The notes of this batch have gone from the folder {self._folder.parent}: another batch has "
+                "begun there, or they were removed. Start this one again when no other is under way."
+            )
 
     def attempts(self, source: str) -> int:
         """Return how often an input was begun and not ended, which takes the worker's death."""
@@ -143,14 +165,14 @@ class Notes:
 
     def begin(self, source: str) -> int:
         """Note that an input is begun; return how often it was by now."""
-        self._folder.mkdir(exist_ok=True)
+        self.check()
         with self._path(source, "begun").open("ab") as file:
             file.write(b".")  # a byte each time: there is no half-written number
         return self.attempts(source)
 
     def keep(self, entry: BatchEntry) -> None:
         """Note what became of an input."""
-        self._folder.mkdir(exist_ok=True)
+        self.check()
         write_bytes(self._path(entry.input, "json"), entry.line().encode())
 
     def end(self, source: str) -> None:
@@ -163,8 +185,7 @@ class Notes:
 
     def kept(self) -> list[BatchEntry]:
         """Return all entries that were kept."""
-        found = [_read_note(path) for path in sorted(self._folder.glob("*.json"))]
-        return [entry for entry in found if entry is not None]
+        return _read_notes(self._folder)
 
     def remove(self) -> None:
         """Take all notes away."""
@@ -172,6 +193,11 @@ class Notes:
 
     def _path(self, source: str, ending: str) -> Path:
         return self._folder / f"{sha256(source.encode('utf-8', 'surrogateescape')).hexdigest()[:32]}.{ending}"
+
+
+def _read_notes(*places: Path) -> list[BatchEntry]:
+    found = [_read_note(path) for place in places for path in sorted(place.glob("*.json"))]
+    return [entry for entry in found if entry is not None]
 
 
 def _read_note(path: Path) -> BatchEntry | None:
@@ -183,7 +209,7 @@ def _read_note(path: Path) -> BatchEntry | None:
 
 
 class Manifest:
-    """The file manifest.jsonl of a batch's folder, together with the notes of a run that was killed.
+    """The file manifest.jsonl of a batch's folder, together with the notes of batches that were killed.
 
     While a batch is under way a line is added for each input that is done; in the end there is one line for
     each input, in order.
@@ -196,18 +222,21 @@ class Manifest:
     Raises
     ------
     FileError
-        The file is there and no manifest.
+        The file is there and no manifest, or nothing can be written.
     """
 
     def __init__(self, folder: Path) -> None:
         self._path = folder / MANIFEST
-        self.notes = Notes(folder)
+        self.run = secrets.token_hex(8)
+        self.notes = Notes(folder, self.run)
         self.entries: dict[str, BatchEntry] = {}
         for entry in _lines(self._path):
             self.entries[entry.input] = entry
-        if self.notes.kept():
+        if _read_notes(*_places(folder)):
             self.settle()
-        self.notes.remove()  # from here on, notes are those of this run
+        for place in _places(folder):  # from here on, notes are those of this batch
+            shutil.rmtree(place, ignore_errors=True)
+        self.notes.open()
 
     def add(self, entry: BatchEntry) -> None:
         """Add what became of an input."""
@@ -223,7 +252,7 @@ class Manifest:
         order : iterable of str
             Inputs that come first; others that the folder holds follow.
         """
-        self.entries |= _noted(self.notes, self._path.parent)
+        self.entries |= _noted(self._path.parent)
         inputs = dict.fromkeys([*order, *self.entries])
         self.entries = {source: self.entries[source] for source in inputs if source in self.entries}
         write_bytes(self._path, "".join(entry.line() for entry in self.entries.values()).encode())
@@ -243,13 +272,20 @@ def read_entries(folder: Path) -> dict[str, BatchEntry]:
     FileError
         The manifest is there and is none.
     """
-    return {entry.input: entry for entry in _lines(folder / MANIFEST)} | _noted(Notes(folder), folder)
+    return {entry.input: entry for entry in _lines(folder / MANIFEST)} | _noted(folder)
 
 
-def _noted(notes: Notes, folder: Path) -> dict[str, BatchEntry]:
+def _places(folder: Path) -> list[Path]:
+    """Return the folders of notes, of this batch and of those that were killed."""
+    return sorted(folder.glob(_NOTES + "*"))
+
+
+def _noted(folder: Path) -> dict[str, BatchEntry]:
     # What was ended between the note and the file has no relief, or an older one.
     return {
-        entry.input: entry for entry in notes.kept() if not entry.made or entry.holds(folder, entry.recipe)
+        entry.input: entry
+        for entry in _read_notes(*_places(folder))
+        if not entry.made or entry.holds(folder, entry.recipe)
     }
 
 

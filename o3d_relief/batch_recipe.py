@@ -93,6 +93,8 @@ class BatchTask:
     recipe : Recipe
     digest : str
         Of the recipe.
+    run : str
+        Name of the batch, by which its notes are found.
     """
 
     input: str
@@ -100,6 +102,7 @@ class BatchTask:
     folder: str
     recipe: Recipe
     digest: str
+    run: str
 
     def entry(self, **values: Any) -> BatchEntry:
         """Return what the manifest says of the input."""
@@ -107,7 +110,7 @@ class BatchTask:
 
 
 def open_tasks(
-    sources: list[str], folder: Path, entries: Mapping[str, BatchEntry], recipe: Recipe
+    sources: list[str], folder: Path, entries: Mapping[str, BatchEntry], recipe: Recipe, run: str = ""
 ) -> tuple[dict[str, str], list[BatchTask]]:
     """Find out what is still to be done.
 
@@ -120,6 +123,8 @@ def open_tasks(
     entries : mapping of str to BatchEntry
         What the folder holds already, by input.
     recipe : Recipe
+    run : str
+        Name of the batch; empty where it is only rehearsed.
 
     Returns
     -------
@@ -138,7 +143,12 @@ def open_tasks(
         if not kept or lacking or refused:
             tasks.append(
                 BatchTask(
-                    input=source, output=names[source], folder=str(folder), recipe=recipe, digest=digest
+                    input=source,
+                    output=names[source],
+                    folder=str(folder),
+                    recipe=recipe,
+                    digest=digest,
+                    run=run,
                 )
             )
     return names, tasks

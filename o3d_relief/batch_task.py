@@ -46,9 +46,14 @@ def run_task(task: BatchTask) -> BatchEntry:
     Returns
     -------
     BatchEntry
-        Whatever goes wrong is said in it; nothing is raised.
+        Whatever goes wrong with the input is said in it.
+
+    Raises
+    ------
+    FileError
+        The batch was killed, and another one has begun in its folder: this worker writes nothing there.
     """
-    notes = Notes(Path(task.folder))
+    notes = Notes(Path(task.folder), task.run)
     with _ALONE:
         kept = notes.entry(task.input)
         if kept is not None and kept.holds(Path(task.folder), task.digest):
@@ -147,6 +152,7 @@ def _make(task: BatchTask, notes: Notes, started: float, known: dict[str, Any]) 
         known["certificate"] = json.loads(json.dumps(relief.report()["certificate"]))  # as it is read again
     files = mesh_files(output, relief.mesh)
     if recipe.strict and relief.certificate.failures:
+        notes.check()
         remove_files(output, files)  # what an earlier run has left
         remove_files(picture_file, ())
         refused = f"{task.output} is not written (strict=True): {' '.join(relief.certificate.failures)}"
@@ -155,11 +161,12 @@ def _make(task: BatchTask, notes: Notes, started: float, known: dict[str, Any]) 
         return entry
     title = f"{output.stem}, {known['depth']:.4g} deep"
     picture = render(relief.mesh, size=_PICTURE, plate=True, title=title)
-    save_png(picture_file, picture)
     checksum = sha256(files[output.name]).hexdigest()
     entry = task.entry(status="made", seconds=_since(started), output_sha256=checksum, **known)
     # The note comes first: killed in between, its checksum does not fit what is there, and all is done again.
+    # Where it can no longer be made, nothing is written.
     notes.keep(entry)
+    save_png(picture_file, picture)
     write_files(output, files)
     return entry
 

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -67,6 +68,17 @@ def wait_for(process, out, count):
     assert process.poll() is None
 
 
+def wait_until(happened):
+    limit = time.monotonic() + 120
+    while not happened():
+        assert time.monotonic() < limit
+        time.sleep(0.02)
+
+
+def contents(out):
+    return {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
+
+
 def lines(out):
     return [json.loads(line) for line in (out / "manifest.jsonl").read_text().splitlines()]
 
@@ -126,6 +138,47 @@ def test_killed_and_taken_up_again(tmp_path):
     assert code == 0
     assert "40 reliefs, 40 of them from an earlier run" in told
     assert stamps(out) == everything
+
+
+@POSIX
+def test_a_worker_outlives_its_batch(tmp_path):
+    """Killed alone, a batch leaves its worker at work: it spoils nothing of the next one."""
+    inputs, out = write_balls(tmp_path / "in", 1), tmp_path / "out"
+    begun, go_on, ended = (tmp_path / name for name in ("begun", "go_on", "ended"))
+    # Python runs this when it starts: who reads the input first waits, and tells when its task has ended.
+    (tmp_path / "sitecustomize.py").write_text(
+        "import pathlib, threading, time\n"
+        "read = pathlib.Path.read_bytes\n"
+        "def tell(place):\n"
+        "    from o3d_relief.batch_task import _ALONE\n"
+        "    with _ALONE:\n"
+        "        (place / 'ended').touch()\n"
+        "def read_bytes(self):\n"
+        "    place = self.parents[1]\n"
+        "    if self.parent.name == 'in' and not (place / 'begun').exists():\n"
+        "        (place / 'begun').touch()\n"
+        "        threading.Thread(target=tell, args=[place], daemon=True).start()\n"
+        "        while not (place / 'go_on').exists():\n"
+        "            time.sleep(0.01)\n"
+        "    return read(self)\n"
+        "pathlib.Path.read_bytes = read_bytes\n"
+    )
+    process = start(inputs, out, "--jobs", "1", path=tmp_path)
+    try:
+        wait_until(begun.exists)
+        process.kill()
+        process.wait()
+        code, told = finish(start(inputs, out, "--jobs", "1", "--alpha", "0.5", path=tmp_path))
+        assert code == 0, told
+        before = contents(out)
+        assert len(before) == 4
+        go_on.touch()
+        wait_until(ended.exists)
+        assert contents(out) == before
+    finally:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.stderr.close()
 
 
 @pytest.mark.slow

@@ -71,12 +71,18 @@ def test_what_still_holds(tmp_path, made):
     assert not made.holds(tmp_path, "abc")
 
 
+def open_notes(folder):
+    notes = Notes(folder, "earlier")
+    notes.open()
+    return notes
+
+
 def test_notes_count_what_was_begun(tmp_path):
-    notes = Notes(tmp_path)
+    notes = open_notes(tmp_path)
     assert notes.attempts("a") == 0
     assert notes.entry("a") is None
     assert [notes.begin("a"), notes.begin("a"), notes.begin("b")] == [1, 2, 1]
-    assert Notes(tmp_path).attempts("a") == 2
+    assert Notes(tmp_path, "earlier").attempts("a") == 2
     notes.keep(failed("a"))
     notes.end("a")
     assert notes.attempts("a") == 0
@@ -87,18 +93,37 @@ def test_notes_count_what_was_begun(tmp_path):
 
 
 def test_a_note_without_its_relief_is_no_entry(tmp_path, made):
-    Notes(tmp_path).keep(made)
+    open_notes(tmp_path).keep(made)
     (tmp_path / "relief.obj").write_bytes(b"old")  # killed just before it was replaced
     assert Manifest(tmp_path).entries == {}
 
 
 def test_a_note_without_its_bytes_is_none(tmp_path):
-    notes = Notes(tmp_path)
+    notes = open_notes(tmp_path)
     notes.keep(failed("a"))
     (note,) = tmp_path.rglob("*.json")
     note.write_bytes(bytes(note.stat().st_size))
     assert notes.entry("a") is None
     assert notes.kept() == []
+
+
+def test_a_batch_that_begins_ends_what_an_earlier_one_notes(tmp_path):
+    notes = open_notes(tmp_path)
+    notes.keep(failed("a"))
+    manifest = Manifest(tmp_path)
+    assert manifest.entries == {"a": failed("a")}
+    assert manifest.notes.kept() == []
+    for step in (lambda: notes.begin("a"), lambda: notes.keep(failed("a")), notes.check):
+        with pytest.raises(FileError, match="notes of this batch have gone"):
+            step()
+    manifest.notes.check()
+    manifest.settle()
+    assert [path.name for path in tmp_path.iterdir()] == ["manifest.jsonl"]
+
+
+def test_notes_that_cannot_be_made(tmp_path):
+    with pytest.raises(FileError, match=r"batch-earlier cannot be made: "):
+        open_notes(tmp_path / "missing")
 
 
 def test_the_last_word_on_an_input_counts(tmp_path, made):

@@ -74,7 +74,9 @@ def test_a_note_of_a_killed_run_counts(tmp_path, scans, capsys):
     from o3d_relief.batch_manifest import BatchEntry, Notes
 
     manifest = out / "manifest.jsonl"
-    Notes(out).keep(BatchEntry.from_line(manifest.read_text()))
+    notes = Notes(out, "killed")
+    notes.open()
+    notes.keep(BatchEntry.from_line(manifest.read_text()))
     manifest.unlink()
     assert "0 reliefs to make, 1 there" in _told(capsys, scans / "ball.ply", "--out", out, "--dry-run")[1]
     assert not manifest.exists()

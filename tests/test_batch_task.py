@@ -8,7 +8,7 @@ import open3d as o3d
 import pytest
 
 import o3d_relief as rel
-from o3d_relief.batch_manifest import Notes
+from o3d_relief.batch_manifest import Manifest, Notes
 from o3d_relief.batch_recipe import BatchTask, Recipe
 from o3d_relief.batch_task import run_task
 from o3d_relief.bounds.certificate import Certificate
@@ -23,14 +23,29 @@ RECIPE = Recipe(
 )
 
 
+RUN = "first"
+
+
 @pytest.fixture
 def task(tmp_path):
     scan = tmp_path / "ball.ply"
     o3d.io.write_triangle_mesh(str(scan), to_mesh(sphere(6)))
     (tmp_path / "pictures").mkdir()
+    Notes(tmp_path, RUN).open()
     return BatchTask(
-        input=str(scan), output="relief.ply", folder=str(tmp_path), recipe=RECIPE, digest=RECIPE.digest()
+        input=str(scan),
+        output="relief.ply",
+        folder=str(tmp_path),
+        recipe=RECIPE,
+        digest=RECIPE.digest(),
+        run=RUN,
     )
+
+
+def begin_anew(folder):
+    """Take all notes away, as the next batch does."""
+    Notes(folder, RUN).remove()
+    Notes(folder, RUN).open()
 
 
 def test_a_relief_its_picture_and_its_entry(tmp_path, task):
@@ -45,8 +60,8 @@ def test_a_relief_its_picture_and_its_entry(tmp_path, task):
     rel.write_mesh(tmp_path / "alone.ply", expected.mesh)
     assert written == (tmp_path / "alone.ply").read_bytes()
     assert entry.holds(tmp_path, RECIPE.digest())
-    assert Notes(tmp_path).entry(task.input) == entry
-    assert Notes(tmp_path).attempts(task.input) == 0
+    assert Notes(tmp_path, RUN).entry(task.input) == entry
+    assert Notes(tmp_path, RUN).attempts(task.input) == 0
     assert run_task(task) == entry  # the first one counts, seconds and all
 
 
@@ -60,9 +75,9 @@ def test_a_certificate_where_it_is_asked_for(task, monkeypatch):
         raise AssertionError("A certificate is made.")
 
     monkeypatch.setattr("o3d_relief.relief.certify", certify)
-    Notes(Path(task.folder)).remove()
+    begin_anew(Path(task.folder))
     assert run_task(task).made
-    Notes(Path(task.folder)).remove()
+    begin_anew(Path(task.folder))
     strict = dataclasses.replace(task, recipe=dataclasses.replace(RECIPE, strict=True))
     assert "A certificate is made" in run_task(strict).error
 
@@ -92,7 +107,7 @@ def test_what_is_wrong_is_said(tmp_path, task, monkeypatch):
 
         monkeypatch.setattr("o3d_relief.pipeline.make_relief", broken)
         assert sentence in run_task(task).error
-    assert Notes(tmp_path).attempts(task.input) == 0
+    assert Notes(tmp_path, RUN).attempts(task.input) == 0
 
 
 def test_strict_refuses_what_the_certificate_finds(tmp_path, task):
@@ -104,7 +119,7 @@ def test_strict_refuses_what_the_certificate_finds(tmp_path, task):
     assert entry.error == f"relief.ply is not written (strict=True): {entry.failures[0]}"
     assert "visible vertices lie behind the plane" in entry.failures[0]
     assert not (tmp_path / "relief.ply").exists()
-    assert Notes(tmp_path).entry(task.input) == entry
+    assert Notes(tmp_path, RUN).entry(task.input) == entry
     noted = dataclasses.replace(loose, certificates=True)
     made = run_task(dataclasses.replace(task, recipe=noted))
     assert made.made
@@ -128,26 +143,27 @@ def test_what_strict_refuses_is_removed_with_all_its_files(tmp_path, task):
     rel.write_mesh(source, mesh)
     folder = tmp_path / "out"
     (folder / "pictures").mkdir(parents=True)
+    Notes(folder, RUN).open()
     recipe = dataclasses.replace(RECIPE, params=rel.ReliefParams(k=64, in_front=False), ending=".obj")
     task = dataclasses.replace(
         task, input=str(source), output="r.obj", folder=str(folder), recipe=recipe, digest=recipe.digest()
     )
     assert run_task(task).made
-    Notes(folder).remove()
+    begin_anew(folder)
     files = {path.name for path in folder.rglob("*") if path.is_file()}
     assert files == {"r.obj", "r.mtl", "r_0.png", "r.png"}
     (folder / "other.ply").touch()
     refused = run_task(dataclasses.replace(task, recipe=dataclasses.replace(recipe, strict=True)))
     assert "r.obj is not written" in refused.error
-    Notes(folder).remove()
+    Notes(folder, RUN).remove()
     assert [path.name for path in folder.rglob("*") if path.is_file()] == ["other.ply"]
 
 
 def test_a_file_that_has_cost_two_workers_is_not_begun_again(tmp_path, task):
-    notes = Notes(tmp_path)
+    notes = Notes(tmp_path, RUN)
     notes.begin(task.input)
     assert run_task(task).attempts == 2  # once more is tried
-    notes.remove()
+    begin_anew(tmp_path)
     (tmp_path / "relief.ply").unlink()
     notes.begin(task.input)
     notes.begin(task.input)
@@ -155,3 +171,23 @@ def test_a_file_that_has_cost_two_workers_is_not_begun_again(tmp_path, task):
     assert not entry.made
     assert "was lost 2 times" in entry.error
     assert notes.attempts(task.input) == 0
+
+
+@pytest.mark.parametrize("strict", [False, True])
+def test_who_outlives_its_batch_writes_nothing_in_the_next_one(tmp_path, task, monkeypatch, strict):
+    written = [tmp_path / "relief.ply", tmp_path / "pictures" / "relief.png"]
+    for path in written:
+        path.write_text("of the next batch")
+
+    def make_relief(*arguments, **options):
+        Manifest(tmp_path)  # another batch begins
+        return made(*arguments, **options)
+
+    made = rel.make_relief
+    monkeypatch.setattr("o3d_relief.pipeline.make_relief", make_relief)
+    monkeypatch.setattr(Certificate, "failures", ["They are bent."])
+    for _ in range(2):  # at work when it begins, and called afterwards
+        with pytest.raises(rel.FileError, match=r"notes of this batch have gone .* another batch has begun"):
+            run_task(dataclasses.replace(task, recipe=dataclasses.replace(RECIPE, strict=strict)))
+    assert [path.read_text() for path in written] == 2 * ["of the next batch"]
+    assert list(tmp_path.rglob("*.json")) == list(tmp_path.rglob("*.begun")) == []
