@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from o3d_relief.batch import Batch, make_reliefs
-    from o3d_relief.batch_manifest import BatchEntry
+    from o3d_relief.batch_entry import BatchEntry
     from o3d_relief.editor import ReliefEditor
     from o3d_relief.errors import (
         Cancelled,
@@ -112,7 +112,7 @@ __all__ = [
 
 _HOME = {
     "Batch": "batch",
-    "BatchEntry": "batch_manifest",
+    "BatchEntry": "batch_entry",
     "make_reliefs": "batch",
     "Cancelled": "errors",
     "DisplayError": "errors",

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from o3d_relief.batch_engine import Engine, check_engine, open_engine
+from o3d_relief.batch_entry import PICTURES, BatchEntry
 from o3d_relief.batch_inputs import find_inputs
 from o3d_relief.batch_lock import sole_batch
-from o3d_relief.batch_manifest import PICTURES, BatchEntry, Manifest, Notes
+from o3d_relief.batch_manifest import Manifest, Notes
 from o3d_relief.batch_recipe import BatchTask, Recipe, open_tasks
 from o3d_relief.batch_sheet import remove_sheets, write_sheets
 from o3d_relief.batch_task import MOST_ATTEMPTS, lost_entry

@@ -13,7 +13,7 @@ from o3d_relief.relief_arguments import chosen_params, chosen_view
 from o3d_relief.scan_arguments import chosen_scan
 
 if TYPE_CHECKING:
-    from o3d_relief.batch_manifest import BatchEntry
+    from o3d_relief.batch_entry import BatchEntry
     from o3d_relief.batch_rehearsal import Rehearsal
     from o3d_relief.params import ReliefParams, View
     from o3d_relief.scan_params import ScanParams

@@ -9,7 +9,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from o3d_relief.batch_manifest import BatchEntry
+from o3d_relief.batch_entry import BatchEntry
 from o3d_relief.batch_recipe import BatchTask
 from o3d_relief.batch_task import MOST_ATTEMPTS, run_task
 from o3d_relief.errors import ParameterError, ReliefError

@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from o3d_relief.batch_manifest import BatchEntry
+from o3d_relief.batch_entry import BatchEntry
 from o3d_relief.errors import FileError, ParameterError
 
 __all__ = ["find_inputs", "output_names"]

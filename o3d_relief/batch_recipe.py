@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from o3d_relief import __version__
+from o3d_relief.batch_entry import BatchEntry
 from o3d_relief.batch_inputs import output_names
-from o3d_relief.batch_manifest import BatchEntry
 from o3d_relief.errors import ParameterError
 from o3d_relief.param_checks import check_kind, check_whole
 from o3d_relief.params import ReliefParams, View

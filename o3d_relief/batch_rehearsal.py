@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from o3d_relief.batch_entry import PICTURES
 from o3d_relief.batch_inputs import find_inputs
 from o3d_relief.batch_lock import check_sole
-from o3d_relief.batch_manifest import PICTURES, read_entries
+from o3d_relief.batch_manifest import read_entries
 from o3d_relief.batch_recipe import BatchTask, Recipe, open_tasks
 from o3d_relief.batch_task import error_sentence, read_input
 from o3d_relief.files import check_folder

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from o3d_relief.batch_manifest import PICTURES, BatchEntry
+from o3d_relief.batch_entry import PICTURES, BatchEntry
 from o3d_relief.files import remove_files
 
 __all__ = ["remove_sheets", "write_sheets"]

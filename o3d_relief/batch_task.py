@@ -10,7 +10,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from o3d_relief.batch_manifest import PICTURES, BatchEntry, Notes
+from o3d_relief.batch_entry import PICTURES, BatchEntry
+from o3d_relief.batch_manifest import Notes
 from o3d_relief.batch_recipe import BatchTask
 from o3d_relief.errors import ReliefError
 from o3d_relief.scan_params import ScanParams

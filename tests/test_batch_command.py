@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 import o3d_relief as rel
-from o3d_relief.batch_manifest import BatchEntry
+from o3d_relief.batch_entry import BatchEntry
 from o3d_relief.cli import main
 
 MADE = BatchEntry(

@@ -2,8 +2,8 @@ from pathlib import Path
 
 import pytest
 
+from o3d_relief.batch_entry import BatchEntry
 from o3d_relief.batch_inputs import find_inputs, output_names
-from o3d_relief.batch_manifest import BatchEntry
 from o3d_relief.errors import FileError, ParameterError
 
 

@@ -1,74 +1,14 @@
 import dataclasses
-import os
-from hashlib import sha256
 
 import pytest
 
-from o3d_relief.batch_manifest import BatchEntry, Manifest, Notes
+from o3d_relief.batch_entry import BatchEntry
+from o3d_relief.batch_manifest import Manifest, Notes
 from o3d_relief.errors import FileError
-
-
-@pytest.fixture
-def made(tmp_path):
-    """Return an entry whose input, relief and picture exist."""
-    scan = tmp_path / "scan.ply"
-    scan.write_bytes(b"points")
-    (tmp_path / "pictures").mkdir()
-    (tmp_path / "pictures" / "relief.png").touch()
-    (tmp_path / "relief.obj").write_bytes(b"faces")
-    return BatchEntry(
-        input=str(scan), output="relief.obj", status="made", seconds=1.5, depth=1 / 3, triangles=7,
-        notes=("no textures", "Größe"), attempts=2, input_bytes=6, input_mtime_ns=scan.stat().st_mtime_ns,
-        recipe="abc", output_sha256=sha256(b"faces").hexdigest(),
-        certificate={"visible_behind": 2, "places": [{"where": [0.1, 1 / 3]}], "failures": ["2 lie behind."]},
-    )  # fmt: skip
 
 
 def failed(name):
     return BatchEntry(input=name, output="b.ply", status="failed", seconds=0.0, error="No.")
-
-
-def test_a_line_says_all(made):
-    assert made.failures == ("2 lie behind.",)
-    assert failed("b.ply").failures == ()
-    line = made.line()
-    assert line.endswith("}\n")
-    assert line.count("\n") == 1
-    assert BatchEntry.from_line(line) == made
-
-
-@pytest.mark.parametrize("line", ["", "{}", "[1]", "3", '{"input": "a"}', '{"notes": [], "other": 3}', "{"])
-def test_other_lines_are_refused(line):
-    with pytest.raises(ValueError, match=r"line of a batch|Expecting"):
-        BatchEntry.from_line(line)
-
-
-@pytest.mark.parametrize("certificate", [{}, 5, [], {"failures": None}, {"failures": "x"}, {"failures": [1]}])
-def test_other_certificates_are_refused(tmp_path, made, certificate):
-    line = dataclasses.replace(made, certificate=certificate).line()
-    with pytest.raises(ValueError, match="not a line of a batch"):
-        BatchEntry.from_line(line)
-    (tmp_path / "manifest.jsonl").write_text(line)
-    with pytest.raises(FileError, match=r"manifest\.jsonl .*line 1"):
-        Manifest(tmp_path)
-
-
-def test_what_still_holds(tmp_path, made):
-    assert made.holds(tmp_path, "abc")
-    assert not made.holds(tmp_path, "abd")
-    assert not dataclasses.replace(made, status="failed").holds(tmp_path, "abc")
-    for name in ("scan.ply", "relief.obj"):
-        path = tmp_path / name
-        before = path.read_bytes(), path.stat()
-        path.write_bytes(b"xxxxx")
-        assert not made.holds(tmp_path, "abc")
-        path.unlink()
-        assert not made.holds(tmp_path, "abc")
-        path.write_bytes(before[0])
-        os.utime(path, ns=(before[1].st_atime_ns, before[1].st_mtime_ns))
-        assert made.holds(tmp_path, "abc")
-    (tmp_path / "pictures" / "relief.png").unlink()
-    assert not made.holds(tmp_path, "abc")
 
 
 def open_notes(folder):
@@ -92,8 +32,8 @@ def test_notes_count_what_was_begun(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_note_without_its_relief_is_no_entry(tmp_path, made):
-    open_notes(tmp_path).keep(made)
+def test_a_note_without_its_relief_is_no_entry(tmp_path, made_entry):
+    open_notes(tmp_path).keep(made_entry)
     (tmp_path / "relief.obj").write_bytes(b"old")  # killed just before it was replaced
     assert Manifest(tmp_path).entries == {}
 
@@ -126,20 +66,20 @@ def test_notes_that_cannot_be_made(tmp_path):
         open_notes(tmp_path / "missing")
 
 
-def test_the_last_word_on_an_input_counts(tmp_path, made):
+def test_the_last_word_on_an_input_counts(tmp_path, made_entry):
     manifest = Manifest(tmp_path)
     manifest.add(failed("x"))
-    manifest.add(failed(made.input))
-    manifest.add(made)
+    manifest.add(failed(made_entry.input))
+    manifest.add(made_entry)
     manifest.notes.keep(failed("y"))
     # As after a kill: the last line was not finished, and the notes are still there.
     with (tmp_path / "manifest.jsonl").open("a") as file:
         file.write('{"input": "y", "outp')
     again = Manifest(tmp_path)
-    assert again.entries == {"x": failed("x"), made.input: made, "y": failed("y")}
-    again.settle([made.input, "y", "unknown"])
+    assert again.entries == {"x": failed("x"), made_entry.input: made_entry, "y": failed("y")}
+    again.settle([made_entry.input, "y", "unknown"])
     lines = (tmp_path / "manifest.jsonl").read_text().splitlines()
-    assert [BatchEntry.from_line(line) for line in lines] == [made, failed("y"), failed("x")]
+    assert [BatchEntry.from_line(line) for line in lines] == [made_entry, failed("y"), failed("x")]
 
 
 @pytest.mark.parametrize("content", [b"{}\n", b"my own list\n", b"\xff\xfe\n"])
@@ -149,3 +89,10 @@ def test_a_file_that_is_no_manifest_is_left_alone(tmp_path, content):
     with pytest.raises(FileError, match=r"manifest\.jsonl .*ove it away"):
         Manifest(tmp_path)
     assert path.read_bytes() == content
+
+
+def test_a_line_with_another_certificate_is_named(tmp_path, made_entry):
+    wrong = dataclasses.replace(made_entry, certificate={"failures": None})
+    (tmp_path / "manifest.jsonl").write_text(made_entry.line() + wrong.line())
+    with pytest.raises(FileError, match=r"manifest\.jsonl .*line 2"):
+        Manifest(tmp_path)

@@ -71,7 +71,8 @@ def test_what_is_there_is_left_alone(tmp_path, scans, capsys):
 def test_a_note_of_a_killed_run_counts(tmp_path, scans, capsys):
     out = tmp_path / "out"
     assert _told(capsys, scans / "ball.ply", "--out", out, "--jobs", "1")[0] == 0
-    from o3d_relief.batch_manifest import BatchEntry, Notes
+    from o3d_relief.batch_entry import BatchEntry
+    from o3d_relief.batch_manifest import Notes
 
     manifest = out / "manifest.jsonl"
     notes = Notes(out, "killed")

@@ -1,7 +1,7 @@
 import numpy as np
 from PIL import Image
 
-from o3d_relief.batch_manifest import BatchEntry
+from o3d_relief.batch_entry import BatchEntry
 from o3d_relief.batch_sheet import remove_sheets, write_sheets
 
 
