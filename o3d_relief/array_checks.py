@@ -21,8 +21,8 @@ __all__ = [
 ]
 
 
-def as_numbers(name: str, value: object) -> NDArray[np.float64]:
-    """Return numbers as an array.
+def as_numbers(name: str, value: object, wanted: str = "numbers") -> NDArray[np.float64]:
+    """Return numbers as an array; `wanted` is what the sentence says they must be.
 
     Examples
     --------
@@ -32,7 +32,7 @@ def as_numbers(name: str, value: object) -> NDArray[np.float64]:
     try:
         return np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
-        raise ParameterError(f"{name} must be numbers. Got {value!r} instead.") from None
+        raise ParameterError(f"{name} must be {wanted}. Got {value!r} instead.") from None
 
 
 def check_array(name: str, value: object, shape: tuple[int, ...]) -> NDArray[np.float64]:
@@ -84,12 +84,10 @@ def check_size(size: object) -> tuple[int, int]:
 
 def check_views(name: str, value: object) -> tuple[tuple[float, float], ...]:
     """Return pairs of degrees, at least one."""
-    try:
-        pairs = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):  # words, or pairs of different lengths
-        pairs = np.zeros(0)
+    wanted = "pairs of degrees, at least one"
+    pairs = as_numbers(name, value, wanted)
     if pairs.ndim != 2 or pairs.shape[1] != 2 or len(pairs) == 0 or not np.isfinite(pairs).all():
-        raise ParameterError(f"{name} must be pairs of degrees, at least one. Got {value!r} instead.")
+        raise ParameterError(f"{name} must be {wanted}. Got {value!r} instead.")
     return tuple((float(yaw), float(pitch)) for yaw, pitch in pairs)
 
 

@@ -15,7 +15,6 @@ __all__ = [
     "check_depth",
     "check_direction",
     "check_indices",
-    "check_integer",
     "check_kind",
     "check_number",
     "check_positive",
@@ -121,26 +120,27 @@ def check_positive(name: str, value: object) -> float:
 
 
 def check_whole(name: str, value: object, low: int = 1, high: int | None = None) -> int:
-    """Return a whole number, no float, as an int.
+    """Return a whole number, which may be a float such as 3.0, as an int.
 
     Examples
     --------
-    >>> check_whole("jobs", 2)
+    >>> check_whole("jobs", 2.0)
     2
     """
-    whole = not isinstance(value, bool) and isinstance(value, Integral)
-    if not whole or value < low or (high is not None and value > high):  # type: ignore[operator]
-        wanted = f", at least {low}" if high is None else f" between {low} and {high}"
+    is_bool = isinstance(value, bool) or type(value).__name__ == "bool"  # numpy's, too
+    try:
+        number = int(value)  # type: ignore[call-overload]
+    except (TypeError, ValueError, OverflowError):
+        number = None
+    wanted = f", at least {low}"
+    if high is not None and high <= 1e6:  # nobody gets beyond by design
+        wanted = f" between {low} and {high}"
+    elif high is not None and number is not None and number > high:
+        wanted = f", at most {high:,}"
+    fits = number is not None and number == value and number >= low and (high is None or number <= high)
+    if is_bool or not fits:
         raise ParameterError(f"{name} must be a whole number{wanted}. Got {value!r} instead.")
-    return int(value)  # type: ignore[call-overload, no-any-return]
-
-
-def check_integer(name: str, value: object, low: int, high: int) -> int:
-    """Return a whole number between two others as an int."""
-    number = check_number(name, value)
-    if number != int(number):
-        raise ParameterError(f"{name} must be a whole number. Got {value!r} instead.")
-    return int(check_range(name, int(number), low, high))
+    return int(number)
 
 
 def check_triple(name: str, value: object) -> Triple:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from o3d_relief.array_checks import as_numbers
 from o3d_relief.errors import ParameterError
 
 __all__ = ["Camera", "box_corners", "fit_camera", "fit_scale", "unit_vector", "view_direction"]
@@ -85,12 +86,10 @@ def view_axes(direction: ArrayLike, up: ArrayLike) -> NDArray[np.float64]:
 
 def unit_vector(name: str, value: ArrayLike) -> NDArray[np.float64]:
     """Check that `value` is a direction and return it with length 1."""
-    try:
-        vector = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):  # a name, for instance
-        vector = np.zeros(0)
+    wanted = "three finite numbers, not all zero"
+    vector = as_numbers(name, value, wanted)
     if vector.shape != (3,) or not np.all(np.isfinite(vector)) or not np.any(vector):
-        raise ParameterError(f"{name} must be three finite numbers, not all zero. Got {value!r} instead.")
+        raise ParameterError(f"{name} must be {wanted}. Got {value!r} instead.")
     return np.asarray(vector / np.linalg.norm(vector))
 
 

@@ -357,7 +357,7 @@ class TestRefusals:
         ({"sensor": (1, 2)}, "sensor must be three numbers"),
         ({"remove_ground": 1}, "remove_ground must be True or False"),
         ({"file_normals": "no"}, "file_normals must be True or False"),
-        ({"depth": 14}, "depth must be between 3 and 13"),
+        ({"depth": 14}, "depth must be a whole number between 3 and 13"),
         ({"depth": 8.5}, "depth must be a whole number"),
         ({"max_points": 10}, "max_points must be"),
         ({"outliers": 0}, "outliers must be greater than 0"),
