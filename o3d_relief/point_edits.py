@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from o3d_relief.errors import ParameterError
-from o3d_relief.param_checks import check_range, check_whole
+from o3d_relief.param_checks import check_range, check_whole, told
 
 __all__ = ["ACTIONS", "PointEdit", "check_edits", "merged"]
 
@@ -76,7 +76,7 @@ def check_edits(values: Any) -> tuple[PointEdit, ...]:
     except TypeError:
         items = (None,)
     if not all(isinstance(item, PointEdit) for item in items):
-        raise ParameterError(f"point_edits must be a sequence of PointEdit. Got {values!r} instead.")
+        raise ParameterError(f"point_edits must be a sequence of PointEdit. Got {told(values)} instead.")
     return items
 
 

@@ -3,8 +3,18 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from o3d_relief.array_checks import as_numbers, check_ends, check_size, check_views
 from o3d_relief.errors import ParameterError
-from o3d_relief.param_checks import check_kind, check_whole, given
+from o3d_relief.param_checks import (
+    check_indices,
+    check_kind,
+    check_number,
+    check_positive,
+    check_triple,
+    check_weights,
+    check_whole,
+    given,
+)
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.scan_params import ScanParams
 
@@ -55,3 +65,33 @@ def test_limits_of_whole_numbers():
             check_whole("size", value, 0, 9)
     with pytest.raises(ParameterError, match="k must be a whole number, at most 2,147,483,647"):
         check_whole("k", 2**31, 1, 2**31 - 1)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [["a"] * 10**5, np.full((50, 3), "a"), 10**5000, [10**5000]],
+    ids=["words", "array", "int", "ints"],
+)
+@pytest.mark.parametrize(
+    "check",
+    [
+        as_numbers,
+        check_ends,
+        check_number,
+        check_positive,
+        check_triple,
+        check_views,
+        check_weights,
+        lambda name, value: check_size(value),
+        lambda name, value: check_whole(name, value, 1, 9),
+    ],
+)
+def test_no_sentence_is_longer_than_a_sentence(check, value):
+    with pytest.raises(ParameterError, match=r"Got something of the class \w+ instead\.$") as caught:
+        check("what", value)
+    assert len(str(caught.value)) < 200
+
+
+def test_the_wrong_one_of_many_is_named():
+    with pytest.raises(ParameterError, match="Got -3 instead"):
+        check_indices("attach", [*range(1000), -3])

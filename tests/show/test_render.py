@@ -472,6 +472,10 @@ def test_a_mesh_that_cannot_be_drawn_raises(vertices, faces, message):
     [
         ({"size": (0, 10)}, "size"),
         ({"size": 16}, "size must be two whole numbers"),
+        ({"size": "64"}, r"size must be two whole numbers\. Got '64' instead"),
+        ({"size": np.array(5)}, r"size must be two whole numbers\. Got array\(5\) instead"),
+        ({"size": np.zeros((2, 3))}, "size must be a whole number"),
+        ({"field": [10**400, 0, 0, 0]}, "field must be numbers"),
         ({"supersampling": 0}, "supersampling"),
         ({"direction": (0, 0, 0)}, "direction"),
         ({"light": (np.nan, 0, 0)}, "light"),
