@@ -20,6 +20,9 @@ __all__ = [
     "check_views",
 ]
 
+_ROUNDING = 1e-6
+"""How far beyond 0 and 1 a colour may lie."""
+
 
 def as_numbers(name: str, value: object, wanted: str = "numbers") -> NDArray[np.float64]:
     """Return numbers as an array; `wanted` is what the sentence says they must be.
@@ -44,10 +47,11 @@ def check_array(name: str, value: object, shape: tuple[int, ...]) -> NDArray[np.
 
 
 def check_colors(name: str, value: object, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """Return finite numbers of one shape; colours beyond 0 and 1 are left to who shows them."""
+    """Return colours of one shape, from 0 to 1 but for rounding errors."""
     array = check_array(name, value, shape)
-    if not np.isfinite(array).all():
-        raise ParameterError(f"{name} must be finite, from 0 to 1. Got numbers that are not.")
+    wrong = array[~((array >= -_ROUNDING) & (array <= 1.0 + _ROUNDING))]
+    if len(wrong):
+        raise ParameterError(f"{name} must be finite, from 0 to 1. Got {wrong[0]:g} instead.")
     return array
 
 
