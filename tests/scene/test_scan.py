@@ -92,6 +92,13 @@ def test_records_are_all_there_in_order_read_only_and_picklable(scan):
         assert list(again.stages) == STAGES
         assert again.params == scan.params
 
+    class Own(rel.Scan):
+        pass
+
+    own = copy.copy(Own(mesh=scan.mesh, stages=scan.stages, params=scan.params))
+    assert type(own) is Own
+    assert list(own.stages) == STAGES
+
 
 def test_cloud_is_not_changed_and_its_mesh_can_be(points):
     cloud = to_cloud(points[0], normals=points[1])
