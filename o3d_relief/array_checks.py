@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o3d_relief.errors import ParameterError
-from o3d_relief.param_checks import check_whole
+from o3d_relief.param_checks import check_whole, told
 
 __all__ = [
     "as_numbers",
@@ -20,9 +20,12 @@ __all__ = [
     "check_views",
 ]
 
+_ROUNDING = 1e-6
+"""How far beyond 0 and 1 a colour may lie."""
 
-def as_numbers(name: str, value: object) -> NDArray[np.float64]:
-    """Return numbers as an array.
+
+def as_numbers(name: str, value: object, wanted: str = "numbers") -> NDArray[np.float64]:
+    """Return numbers as an array; `wanted` is what the sentence says they must be.
 
     Examples
     --------
@@ -31,8 +34,8 @@ def as_numbers(name: str, value: object) -> NDArray[np.float64]:
     """
     try:
         return np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ParameterError(f"{name} must be numbers. Got {value!r} instead.") from None
+    except (TypeError, ValueError, OverflowError):
+        raise ParameterError(f"{name} must be {wanted}. Got {told(value)} instead.") from None
 
 
 def check_array(name: str, value: object, shape: tuple[int, ...]) -> NDArray[np.float64]:
@@ -44,10 +47,11 @@ def check_array(name: str, value: object, shape: tuple[int, ...]) -> NDArray[np.
 
 
 def check_colors(name: str, value: object, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """Return finite numbers of one shape; colours beyond 0 and 1 are left to who shows them."""
+    """Return colours of one shape, from 0 to 1 but for rounding errors."""
     array = check_array(name, value, shape)
-    if not np.isfinite(array).all():
-        raise ParameterError(f"{name} must be finite, from 0 to 1. Got numbers that are not.")
+    wrong = array[~((array >= -_ROUNDING) & (array <= 1.0 + _ROUNDING))]
+    if len(wrong):
+        raise ParameterError(f"{name} must be finite, from 0 to 1. Got {wrong[0]:g} instead.")
     return array
 
 
@@ -62,7 +66,7 @@ def check_ends(name: str, value: object) -> tuple[float, float]:
     low, high = check_array(name, value, (2,))
     if not (np.isfinite(low) and np.isfinite(high) and low <= high):
         raise ParameterError(
-            f"{name} must be two finite numbers, the lower one first. Got {value!r} instead."
+            f"{name} must be two finite numbers, the lower one first. Got {told(value)} instead."
         )
     return float(low), float(high)
 
@@ -75,21 +79,19 @@ def check_size(size: object) -> tuple[int, int]:
     >>> check_size(np.array([64, 48]))
     (64, 48)
     """
-    sides = tuple(size) if isinstance(size, Sequence | np.ndarray) else ()
-    if len(sides) != 2:
-        raise ParameterError(f"size must be two whole numbers. Got {size!r} instead.")
+    sides = size.tolist() if isinstance(size, np.ndarray) else size
+    if not isinstance(sides, Sequence) or isinstance(sides, str | bytes) or len(sides) != 2:
+        raise ParameterError(f"size must be two whole numbers. Got {told(size)} instead.")
     width, height = (check_whole("size", side, 1, 20_000) for side in sides)
     return width, height
 
 
 def check_views(name: str, value: object) -> tuple[tuple[float, float], ...]:
     """Return pairs of degrees, at least one."""
-    try:
-        pairs = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):  # words, or pairs of different lengths
-        pairs = np.zeros(0)
+    wanted = "pairs of degrees, at least one"
+    pairs = as_numbers(name, value, wanted)
     if pairs.ndim != 2 or pairs.shape[1] != 2 or len(pairs) == 0 or not np.isfinite(pairs).all():
-        raise ParameterError(f"{name} must be pairs of degrees, at least one. Got {value!r} instead.")
+        raise ParameterError(f"{name} must be {wanted}. Got {told(value)} instead.")
     return tuple((float(yaw), float(pitch)) for yaw, pitch in pairs)
 
 

@@ -15,7 +15,7 @@ from o3d_relief.errors import ParameterError
 from o3d_relief.history import History
 from o3d_relief.journal import OnStage
 from o3d_relief.live_scene import LivePoints, LiveScene
-from o3d_relief.param_checks import check_kind, given
+from o3d_relief.param_checks import check_kind, given, told
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.params_file import load_params, save_params
 from o3d_relief.pipeline import make_relief
@@ -290,9 +290,10 @@ class ReliefEditor:
         numbers = np.unique(np.atleast_1d(np.asarray(points)))
         count = len(self._live.index)
         if len(numbers) and not np.issubdtype(numbers.dtype, np.integer):
-            raise ParameterError(f"points must be whole numbers. Got {points!r} instead.")
+            raise ParameterError(f"points must be whole numbers. Got {told(points)} instead.")
         if len(numbers) and not 0 <= numbers[0] <= numbers[-1] < count:
-            raise ParameterError(f"points must be between 0 and {count - 1}. Got {points!r} instead.")
+            wrong = numbers[0] if numbers[0] < 0 else numbers[-1]
+            raise ParameterError(f"points must be between 0 and {count - 1}. Got {wrong} instead.")
         return self._live, [int(number) for number in numbers]
 
     def _go(self, params: ReliefParams, view: View, continued: bool = False) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from numbers import Integral
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from o3d_relief.errors import ParameterError
 
@@ -15,7 +15,6 @@ __all__ = [
     "check_depth",
     "check_direction",
     "check_indices",
-    "check_integer",
     "check_kind",
     "check_number",
     "check_positive",
@@ -24,6 +23,7 @@ __all__ = [
     "check_weights",
     "check_whole",
     "given",
+    "told",
 ]
 
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -34,6 +34,23 @@ _Kind = TypeVar("_Kind")
 
 _LONGEST = 80
 """Characters of a value that are repeated in a sentence."""
+
+
+def told(value: object) -> str:
+    """Return a value as a sentence names it: as it is typed, or by its class where that is long.
+
+    Examples
+    --------
+    >>> told("5"), told(range(3)), told([0] * 100)
+    ("'5'", 'range(0, 3)', 'something of the class list')
+    """
+    try:
+        words = repr(value)
+    except ValueError:  # a whole number of more digits than Python writes
+        words = "\n"
+    if len(words) > _LONGEST or "\n" in words:  # an array, or a whole relief
+        return f"something of the class {type(value).__name__}"
+    return words
 
 
 def check_kind(name: str, value: object, kind: type, source: str = "") -> None:
@@ -59,10 +76,7 @@ def check_kind(name: str, value: object, kind: type, source: str = "") -> None:
     """
     if not isinstance(value, kind):
         made = f", as {source} returns" if source else ""
-        told = repr(value)
-        if len(told) > _LONGEST or "\n" in told:  # an array, or a whole relief
-            told = f"something of the class {type(value).__name__}"
-        raise ParameterError(f"{name} must be a {kind.__name__}{made}. Got {told} instead.")
+        raise ParameterError(f"{name} must be a {kind.__name__}{made}. Got {told(value)} instead.")
 
 
 def given(name: str, value: _Kind | None, kind: type[_Kind]) -> _Kind:
@@ -75,13 +89,13 @@ def given(name: str, value: _Kind | None, kind: type[_Kind]) -> _Kind:
 def check_number(name: str, value: object) -> float:
     """Return a finite number as a float."""
     if isinstance(value, bool | str) or type(value).__name__ == "bool":  # numpy's bool, too
-        raise ParameterError(f"{name} must be a number. Got {value!r} instead.")
+        raise ParameterError(f"{name} must be a number. Got {told(value)} instead.")
     try:
         number = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError):
-        raise ParameterError(f"{name} must be a number. Got {value!r} instead.") from None
+        raise ParameterError(f"{name} must be a number. Got {told(value)} instead.") from None
     if not math.isfinite(number):
-        raise ParameterError(f"{name} must be finite. Got {value!r} instead.")
+        raise ParameterError(f"{name} must be finite. Got {told(value)} instead.")
     return number
 
 
@@ -96,7 +110,7 @@ def check_depth(name: str, value: object) -> float | str:
     if not 0.0 < share <= 100.0:
         raise ParameterError(
             f"{name} must be a length, or a share of the scene's depth up to 100%, as '25%'. "
-            f"Got {value!r} instead."
+            f"Got {told(value)} instead."
         )
     return f"{share!r}%".replace(".0%", "%")
 
@@ -108,7 +122,7 @@ def check_range(name: str, value: object, low: float, high: float = math.inf) ->
         wanted = f"between {low:g} and {high:g}"
         if high > 1e6:  # nobody gets there by design
             wanted = f"at least {low:g}" if number < low else f"at most {int(high):,}"
-        raise ParameterError(f"{name} must be {wanted}. Got {value!r} instead.")
+        raise ParameterError(f"{name} must be {wanted}. Got {told(value)} instead.")
     return number
 
 
@@ -116,31 +130,32 @@ def check_positive(name: str, value: object) -> float:
     """Return a number greater than 0 as a float."""
     number = check_number(name, value)
     if number <= 0.0:
-        raise ParameterError(f"{name} must be greater than 0. Got {value!r} instead.")
+        raise ParameterError(f"{name} must be greater than 0. Got {told(value)} instead.")
     return number
 
 
 def check_whole(name: str, value: object, low: int = 1, high: int | None = None) -> int:
-    """Return a whole number, no float, as an int.
+    """Return a whole number, which may be a float such as 3.0, as an int.
 
     Examples
     --------
-    >>> check_whole("jobs", 2)
+    >>> check_whole("jobs", 2.0)
     2
     """
-    whole = not isinstance(value, bool) and isinstance(value, Integral)
-    if not whole or value < low or (high is not None and value > high):  # type: ignore[operator]
-        wanted = f", at least {low}" if high is None else f" between {low} and {high}"
-        raise ParameterError(f"{name} must be a whole number{wanted}. Got {value!r} instead.")
-    return int(value)  # type: ignore[call-overload, no-any-return]
-
-
-def check_integer(name: str, value: object, low: int, high: int) -> int:
-    """Return a whole number between two others as an int."""
-    number = check_number(name, value)
-    if number != int(number):
-        raise ParameterError(f"{name} must be a whole number. Got {value!r} instead.")
-    return int(check_range(name, int(number), low, high))
+    is_bool = isinstance(value, bool) or type(value).__name__ == "bool"  # numpy's, too
+    try:
+        number = int(value)  # type: ignore[call-overload]
+    except (TypeError, ValueError, OverflowError):
+        number = None
+    wanted = f", at least {low}"
+    if high is not None and high <= 1e6:  # nobody gets beyond by design
+        wanted = f" between {low} and {high}"
+    elif high is not None and number is not None and number > high:
+        wanted = f", at most {high:,}"
+    fits = number is not None and number == value and number >= low and (high is None or number <= high)
+    if is_bool or not fits:
+        raise ParameterError(f"{name} must be a whole number{wanted}. Got {told(value)} instead.")
+    return int(number)
 
 
 def check_triple(name: str, value: object) -> Triple:
@@ -150,7 +165,7 @@ def check_triple(name: str, value: object) -> Triple:
     except TypeError:
         items = ()
     if len(items) != 3:
-        raise ParameterError(f"{name} must be three numbers. Got {value!r} instead.")
+        raise ParameterError(f"{name} must be three numbers. Got {told(value)} instead.")
     x, y, z = (check_number(name, item) for item in items)
     return (x, y, z)
 
@@ -161,14 +176,14 @@ def check_direction(name: str, value: object) -> Triple:
         axis = _AXES.get(value.lower().lstrip("+-"))
         if axis is None or len(value) > 2:
             raise ParameterError(
-                f"{name} must be x, -x, y, -y, z, -z or three numbers. Got {value!r} instead."
+                f"{name} must be x, -x, y, -y, z, -z or three numbers. Got {told(value)} instead."
             )
         sign = -1.0 if value.startswith("-") else 1.0
         return (sign * axis[0] + 0.0, sign * axis[1] + 0.0, sign * axis[2] + 0.0)
     x, y, z = check_triple(name, value)
     largest = max(abs(x), abs(y), abs(z))
     if largest == 0.0:
-        raise ParameterError(f"{name} must not be the zero vector. Got {value!r} instead.")
+        raise ParameterError(f"{name} must not be the zero vector. Got {told(value)} instead.")
     # Only the direction counts; its squares must neither overflow nor vanish.
     return (x / largest + 0.0, y / largest + 0.0, z / largest + 0.0)
 
@@ -187,23 +202,27 @@ def check_beta(value: float | Sequence[float]) -> float | tuple[float, ...]:
 def check_indices(name: str, values: object) -> tuple[int, ...]:
     """Return numbers of vertices as a tuple."""
     try:
-        items: tuple[object, ...] = () if isinstance(values, str) else tuple(values)  # type: ignore[arg-type]
+        items: Sequence[Any] = () if isinstance(values, str) else tuple(values)  # type: ignore[arg-type]
+        wrong: list[object] = [values] if isinstance(values, str) else []
     except TypeError:
-        items = (None,)
-    if isinstance(values, str) or any(
-        isinstance(item, bool) or not isinstance(item, Integral) or item < 0 for item in items
-    ):
-        raise ParameterError(f"{name} must be numbers of vertices, each at least 0. Got {values!r} instead.")
-    return tuple(int(item) for item in items)  # type: ignore[call-overload]
+        items, wrong = (), [values]
+    wrong += [item for item in items if isinstance(item, bool) or not isinstance(item, Integral) or item < 0]
+    if wrong:
+        raise ParameterError(
+            f"{name} must be numbers of vertices, each at least 0. Got {told(wrong[0])} instead."
+        )
+    return tuple(int(item) for item in items)
 
 
 def check_weights(name: str, values: object) -> tuple[float, ...]:
     """Return positive numbers as a tuple."""
     try:
         items = tuple(float(item) for item in values)  # type: ignore[attr-defined]
-    except (TypeError, ValueError):
-        raise ParameterError(f"{name} must be one number for each vertex. Got {values!r} instead.") from None
+    except (TypeError, ValueError, OverflowError):
+        raise ParameterError(
+            f"{name} must be one number for each vertex. Got {told(values)} instead."
+        ) from None
     wrong = [item for item in items if not 0.0 < item < math.inf]
     if wrong:
-        raise ParameterError(f"{name} must be finite and greater than 0. Got {wrong[0]!r} instead.")
+        raise ParameterError(f"{name} must be finite and greater than 0. Got {told(wrong[0])} instead.")
     return items

@@ -15,11 +15,11 @@ from o3d_relief.param_checks import (
     check_depth,
     check_direction,
     check_indices,
-    check_integer,
     check_number,
     check_range,
     check_triple,
     check_weights,
+    check_whole,
 )
 from o3d_relief.point_edits import PointEdit, check_edits
 
@@ -211,7 +211,7 @@ class ReliefParams:
 
     def __post_init__(self) -> None:
         set_field = object.__setattr__
-        set_field(self, "k", check_integer("k", self.k, 1, 2**31 - 1))
+        set_field(self, "k", check_whole("k", self.k, 1, 2**31 - 1))
         set_field(self, "beta", check_beta(self.beta))
         for name in ("discard_above", "attach_below", "max_order_error", "blend"):
             set_field(self, name, check_range(name, getattr(self, name), 0.0, 1.0))
@@ -226,7 +226,7 @@ class ReliefParams:
         set_field(self, "min_gap", check_range("min_gap", self.min_gap, 0.0))
         if self.min_gap > 0.0 and not self.in_order:
             raise ParameterError("min_gap needs in_order: a gap cannot be kept where the order is not.")
-        set_field(self, "seed", check_integer("seed", self.seed, 0, 2**32 - 1))
+        set_field(self, "seed", check_whole("seed", self.seed, 0, 2**32 - 1))
         set_field(self, "point_edits", check_edits(self.point_edits))
         self._check_compression()
         self._check_mode()

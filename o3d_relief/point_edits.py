@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from o3d_relief.errors import ParameterError
-from o3d_relief.param_checks import check_integer, check_range
+from o3d_relief.param_checks import check_range, check_whole, told
 
 __all__ = ["ACTIONS", "PointEdit", "check_edits", "merged"]
 
@@ -46,7 +46,7 @@ class PointEdit:
     beta: float | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "vertex", check_integer("vertex", self.vertex, 0, 2**63 - 1))
+        object.__setattr__(self, "vertex", check_whole("vertex", self.vertex, 0, 2**63 - 1))
         if self.action is not None and self.action not in ACTIONS:
             raise ParameterError(
                 f'action must be "attach", "scale" or "discard". Got {self.action!r} instead.'
@@ -76,7 +76,7 @@ def check_edits(values: Any) -> tuple[PointEdit, ...]:
     except TypeError:
         items = (None,)
     if not all(isinstance(item, PointEdit) for item in items):
-        raise ParameterError(f"point_edits must be a sequence of PointEdit. Got {values!r} instead.")
+        raise ParameterError(f"point_edits must be a sequence of PointEdit. Got {told(values)} instead.")
     return items
 
 

@@ -25,7 +25,9 @@ __all__ = ["Relief"]
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Relief:
-    """A high relief and how it came about. It can be pickled and copied, which Open3D's meshes cannot.
+    """A high relief and how it came about.
+
+    It can be pickled, for the same version of this package, and copied, which Open3D's meshes cannot.
 
     Attributes
     ----------
@@ -69,10 +71,12 @@ class Relief:
             f"{depth:.4g} deep, stages {', '.join(self.stages)}>"
         )
 
-    def __reduce__(self) -> tuple[Callable[..., Relief], tuple[PackedMesh, dict[str, Any], Any]]:
+    def __reduce__(
+        self,
+    ) -> tuple[Callable[..., Relief], tuple[type[Relief], PackedMesh, dict[str, Any], Any]]:
         values = {item.name: getattr(self, item.name) for item in fields(self) if item.name != "mesh"}
         values["stages"] = dict(self.stages)
-        return _restored, (PackedMesh.of(self.mesh), values, vars(self).get("certificate"))
+        return _restored, (type(self), PackedMesh.of(self.mesh), values, vars(self).get("certificate"))
 
     def _repr_png_(self) -> bytes:
         """Show the relief in a notebook: a sheet of views."""
@@ -147,8 +151,10 @@ class Relief:
         }
 
 
-def _restored(mesh: PackedMesh, values: dict[str, Any], certificate: Certificate | None) -> Relief:
-    relief = Relief(mesh=mesh.mesh(), **values | {"stages": MappingProxyType(values["stages"])})
+def _restored(
+    kind: type[Relief], mesh: PackedMesh, values: dict[str, Any], certificate: Certificate | None
+) -> Relief:
+    relief = kind(mesh=mesh.mesh(), **values | {"stages": MappingProxyType(values["stages"])})
     if certificate is not None:
         vars(relief)["certificate"] = certificate
     return relief

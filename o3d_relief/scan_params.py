@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from o3d_relief.errors import ParameterError
-from o3d_relief.param_checks import Triple, check_integer, check_positive, check_range, check_triple
+from o3d_relief.param_checks import Triple, check_positive, check_range, check_triple, check_whole
 
 __all__ = ["ScanParams"]
 
@@ -75,11 +75,11 @@ class ScanParams:
             if not isinstance(getattr(self, name), bool):
                 raise ParameterError(f"{name} must be True or False. Got {getattr(self, name)!r} instead.")
         if self.depth is not None:
-            set_field(self, "depth", check_integer("depth", self.depth, 3, 13))
-        set_field(self, "max_points", check_integer("max_points", self.max_points, 1000, 2**31 - 1))
+            set_field(self, "depth", check_whole("depth", self.depth, 3, 13))
+        set_field(self, "max_points", check_whole("max_points", self.max_points, 1000, 2**31 - 1))
         if self.outliers is not None:
             set_field(self, "outliers", check_positive("outliers", self.outliers))
         set_field(self, "max_hole", check_range("max_hole", self.max_hole, 0.0))
         set_field(self, "min_part", check_range("min_part", self.min_part, 0.0, 1.0))
-        set_field(self, "threads", check_integer("threads", self.threads, 1, 1024))
-        set_field(self, "seed", check_integer("seed", self.seed, 0, 2**32 - 1))
+        set_field(self, "threads", check_whole("threads", self.threads, 1, 1024))
+        set_field(self, "seed", check_whole("seed", self.seed, 0, 2**32 - 1))

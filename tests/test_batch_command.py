@@ -102,7 +102,7 @@ def test_every_option_arrives(tmp_path, monkeypatch):
     [
         (["--jobs", "0"], "jobs must be a whole number, at least 1"),
         (["--scheduler", "tcp://h:1"], "scheduler is the address of a cluster"),
-        (["-k", "0"], "k must be at least 1"),
+        (["-k", "0"], "k must be a whole number, at least 1"),
     ],
 )
 def test_wrong_options(tmp_path, capsys, words, sentence):

@@ -387,12 +387,12 @@ def test_outliers_zero_keeps_all():
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["-k", "0"], "-k must be at least 1"),
+        (["-k", "0"], "-k must be a whole number, at least 1"),
         (["--min-gap", "1", "--no-in-order"], "--min-gap needs --in-order"),
         (["-k", "999999"], "k must be at most the number of vertices"),
         (["--alpha", "0.5", "--depth", "3"], "--alpha and --depth exclude each other"),
         (["--mode", "bounded"], "--mode bounded needs a depth"),
-        (["--scan-depth", "40"], "--scan-depth must be between 3 and 13"),
+        (["--scan-depth", "40"], "--scan-depth must be a whole number between 3 and 13"),
         (["--depth", "3", "--attach", "99999999"], "attach must be numbers of the mesh's"),
         (["--front", "y"], "parallel"),
         (["--viewpoint", "0,0,3"], "in front of the scene"),

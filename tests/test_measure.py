@@ -190,7 +190,7 @@ def test_similarity_needs_scikit_image(ball, monkeypatch):
         measure_relief(ball, ball, views=FRONT, size=16, similarity=True)
 
 
-@pytest.mark.parametrize("size", [7, 8193, 64.0])
+@pytest.mark.parametrize("size", [7, 8193, 64.5, "64"])
 def test_bad_size(ball, size):
     with pytest.raises(ParameterError, match="size must be a whole number"):
         Yardstick(ball, size=size)

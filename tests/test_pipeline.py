@@ -4,6 +4,7 @@ import os
 import pickle
 import subprocess
 import sys
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -93,6 +94,15 @@ def test_a_relief_survives_pickling_and_copying(through):
     assert through(relief).certificate == relief.certificate
     again.mesh.clear()
     assert len(relief.mesh.vertices) > 0
+
+
+def test_a_relief_of_an_own_class_keeps_it(relief):
+    class Own(rel.Relief):
+        pass
+
+    own = copy.copy(Own(**{item.name: getattr(relief, item.name) for item in fields(relief)}))
+    assert type(own) is Own
+    assert own.params == relief.params
 
 
 def test_short_words_for_long_things(relief):

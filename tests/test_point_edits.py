@@ -6,9 +6,9 @@ from o3d_relief import ParameterError, PointEdit, ReliefParams
 @pytest.mark.parametrize(
     ("values", "words"),
     [
-        ({"vertex": -1, "beta": 1}, "vertex must be at least 0"),
+        ({"vertex": -1, "beta": 1}, "vertex must be a whole number, at least 0"),
         ({"vertex": 1.5, "beta": 1}, "vertex must be a whole number"),
-        ({"vertex": "1", "beta": 1}, "vertex must be a number"),
+        ({"vertex": "1", "beta": 1}, "vertex must be a whole number"),
         ({"vertex": 1}, "edit of vertex 1 changes nothing"),
         ({"vertex": 1, "action": "release"}, 'action must be "attach", "scale" or "discard"'),
         ({"vertex": 1, "beta": -0.5}, "beta must be at least 0"),

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from types import MappingProxyType
+from typing import Any
 
 import open3d as o3d
 
@@ -24,7 +25,9 @@ __all__ = ["Scan", "mesh_from_points", "scan_points"]
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Scan:
-    """The mesh of a point cloud and how it came about. It can be pickled and copied.
+    """The mesh of a point cloud and how it came about.
+
+    It can be pickled, for the same version of this package, and copied.
 
     Attributes
     ----------
@@ -45,12 +48,13 @@ class Scan:
             f"stages {', '.join(self.stages)}>"
         )
 
-    def __reduce__(self) -> tuple[Callable[..., Scan], tuple[PackedMesh, dict[str, StageRecord], ScanParams]]:
-        return _restored, (PackedMesh.of(self.mesh), dict(self.stages), self.params)
+    def __reduce__(self) -> tuple[Callable[..., Scan], tuple[type[Scan], PackedMesh, dict[str, Any]]]:
+        values = {item.name: getattr(self, item.name) for item in fields(self) if item.name != "mesh"}
+        return _restored, (type(self), PackedMesh.of(self.mesh), values | {"stages": dict(self.stages)})
 
 
-def _restored(mesh: PackedMesh, stages: dict[str, StageRecord], params: ScanParams) -> Scan:
-    return Scan(mesh=mesh.mesh(), stages=MappingProxyType(stages), params=params)
+def _restored(kind: type[Scan], mesh: PackedMesh, values: dict[str, Any]) -> Scan:
+    return kind(**values | {"mesh": mesh.mesh(), "stages": MappingProxyType(values["stages"])})
 
 
 def scan_points(

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from o3d_relief.array_checks import as_numbers
 from o3d_relief.errors import ParameterError
+from o3d_relief.param_checks import told
 
 __all__ = ["Camera", "box_corners", "fit_camera", "fit_scale", "unit_vector", "view_direction"]
 
@@ -85,12 +87,10 @@ def view_axes(direction: ArrayLike, up: ArrayLike) -> NDArray[np.float64]:
 
 def unit_vector(name: str, value: ArrayLike) -> NDArray[np.float64]:
     """Check that `value` is a direction and return it with length 1."""
-    try:
-        vector = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):  # a name, for instance
-        vector = np.zeros(0)
+    wanted = "three finite numbers, not all zero"
+    vector = as_numbers(name, value, wanted)
     if vector.shape != (3,) or not np.all(np.isfinite(vector)) or not np.any(vector):
-        raise ParameterError(f"{name} must be three finite numbers, not all zero. Got {value!r} instead.")
+        raise ParameterError(f"{name} must be {wanted}. Got {told(value)} instead.")
     return np.asarray(vector / np.linalg.norm(vector))
 
 
@@ -98,7 +98,7 @@ def box_corners(bounds: ArrayLike) -> NDArray[np.float64]:
     """Check that `bounds` (2, 3) is a box and return its corners (8, 3)."""
     box = np.asarray(bounds, dtype=np.float64)
     if box.shape != (2, 3) or not np.all(np.isfinite(box)) or np.any(box[1] < box[0]):
-        raise ParameterError(f"bounds must be two points, least and greatest. Got {bounds!r} instead.")
+        raise ParameterError(f"bounds must be two points, least and greatest. Got {told(bounds)} instead.")
     choice = (np.arange(8)[:, None] >> np.arange(3)) & 1
     return np.asarray(np.where(choice == 1, box[1], box[0]))
 

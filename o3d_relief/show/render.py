@@ -28,7 +28,7 @@ from o3d_relief.show.colors import COLORMAPS, apply_colormap, finite_range, to_l
 from o3d_relief.show.darkroom import take_picture
 from o3d_relief.show.exposure import Lighting
 from o3d_relief.show.paint import Paint
-from o3d_relief.show.surface import read_surface
+from o3d_relief.show.surface import Surface, read_surface
 
 if TYPE_CHECKING:
     import open3d as o3d
@@ -87,7 +87,7 @@ def render(
     crease : float
         Degrees. Edges sharper than this stay sharp, all others are smooth; 0 gives flat shading.
     colors : (n, 3) float, optional
-        sRGB colours in [0, 1] instead of the mesh's own.
+        sRGB colours in [0, 1] instead of the mesh's own; those of vertices that no face uses do not count.
     sharp_colors : bool
         Do not blend colours between vertices: right for labels.
     field : (n,) float, optional
@@ -153,7 +153,7 @@ def render(
         if values is not None and shown is None:
             shown = finite_range(as_numbers(name, values))
     bar = None if shown is None or (field is None and point_field is None) else (colormap, shown, field_label)
-    paint = _paint(len(surface.vertices), colors, sharp_colors, field, bar)
+    paint = _paint(surface, colors, sharp_colors, field, bar)
     box = surface.bounds() if bounds is None else check_array("bounds", bounds, (2, 3))
     area = free_area(size, title=title, legend=legend, bar=bar)
     slab = plate_bounds(box) if plate else None
@@ -240,10 +240,14 @@ def _point_colors(
 
 
 def _paint(
-    count: int, colors: ArrayLike | None, sharp: bool, field: ArrayLike | None, bar: Bar | None
+    surface: Surface, colors: ArrayLike | None, sharp: bool, field: ArrayLike | None, bar: Bar | None
 ) -> Paint:
+    count = len(surface.vertices)
     if colors is not None:
-        return Paint(colors=to_linear(check_colors("colors", colors, (count, 3))), sharp=sharp)
+        shades = np.zeros((count, 3))
+        used = np.unique(surface.faces)  # those of other vertices may be anything
+        shades[used] = check_colors("colors", check_array("colors", colors, (count, 3))[used], (len(used), 3))
+        return Paint(colors=to_linear(shades), sharp=sharp)
     if field is None or bar is None:
         return Paint(sharp=sharp)
     return Paint(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from o3d_relief.array_checks import check_picture
 from o3d_relief.errors import FileError, ParameterError
-from o3d_relief.param_checks import check_whole
+from o3d_relief.param_checks import check_whole, told
 from o3d_relief.records import StageRecord
 from o3d_relief.show.annotate import font_size, write
 from o3d_relief.show.camera import fit_scale, view_direction
@@ -74,8 +74,9 @@ def contact_sheet(
     rows = -(-len(images) // columns)
     if len(titles) not in (0, len(images)) or len(row_labels) not in (0, rows):
         raise ParameterError("A sheet needs a title for each picture or none, a label for each row or none.")
-    if not all(isinstance(text, str) for text in (*titles, *row_labels)):
-        raise ParameterError(f"Titles and labels must be text. Got {(*titles, *row_labels)!r} instead.")
+    for text in (*titles, *row_labels):
+        if not isinstance(text, str):
+            raise ParameterError(f"Titles and labels must be text. Got {told(text)} instead.")
     height, width = images[0].shape[:2]
     letter = round(1.3 * font_size((width, height)))
     heads = [2 * letter if any(titles[row * columns : (row + 1) * columns]) else 0 for row in range(rows)]

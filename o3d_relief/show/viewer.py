@@ -122,7 +122,8 @@ class StageViewer:
 
     def close(self) -> None:
         """Close the window, if it is still there; who waits for that goes on."""
-        self._closed_here = True
+        if self._process.poll() is None:  # one that broke before was not closed
+            self._closed_here = True
         self._end_input()
         self._process.terminate()
         self._process.wait()

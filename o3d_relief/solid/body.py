@@ -63,9 +63,9 @@ class Solid:
         x, y, z = self.size
         return f"<Solid: {len(self.faces)} triangles, {x:.2f} x {y:.2f} x {z:.2f} mm>"
 
-    def __reduce__(self) -> tuple[Callable[..., Solid], tuple[dict[str, Any]]]:
+    def __reduce__(self) -> tuple[Callable[..., Solid], tuple[type[Solid], dict[str, Any]]]:
         values = {item.name: getattr(self, item.name) for item in fields(self)}
-        return _restored, (values | {"counts": dict(self.counts)},)
+        return _restored, (type(self), values | {"counts": dict(self.counts)})
 
     @property
     def size(self) -> NDArray[np.float64]:
@@ -185,8 +185,8 @@ class Solid:
         return cls(vertices=properties[used, :3], faces=index[corners], colors=colors, is_plate=is_plate)
 
 
-def _restored(values: dict[str, Any]) -> Solid:
-    return Solid(**values)
+def _restored(kind: type[Solid], values: dict[str, Any]) -> Solid:
+    return kind(**values)
 
 
 def manifold_of(

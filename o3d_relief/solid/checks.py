@@ -19,6 +19,7 @@ from o3d_relief.solid.measures import (
     overlap_share,
     quantile,
     walls_sampled,
+    winding_number,
 )
 
 __all__ = ["SolidReport", "check_solid"]
@@ -55,7 +56,7 @@ class SolidReport:
     watertight, oriented : bool
         Every edge has exactly two faces; they turn the same way round.
     bodies : int
-        Connected parts, without voids; 1 is one piece.
+        Connected parts, without voids, those that are inside out, too; 1 is one piece.
     back_deviation_mm : float
         Largest distance of the back's corners from its plane, -1 where nothing lies in it.
     overlap_share : float
@@ -119,7 +120,7 @@ def check_solid(solid: Solid, params: PlateParams) -> SolidReport:
     normals = np.cross(b - a, c - a) / 2.0
     area = np.linalg.norm(normals, axis=1)
     _, share, walls = walls_sampled(solid)
-    volumes = _volumes(vertices, faces)
+    volumes, turned = _volumes(vertices, faces, params.nozzle_mm**3)
     values: dict[str, Any] = {
         "size_mm": tuple(float(length) for length in solid.size),
         "volume_mm3": solid.volume,
@@ -135,23 +136,36 @@ def check_solid(solid: Solid, params: PlateParams) -> SolidReport:
         "overhang_area_mm2": overhang_area(vertices, faces, normals, area, params),
         "counts": dict(solid.counts),
     }
-    failures, warnings = _failures(values, params), _warnings(values, params, sum(volumes[:-1]))
+    failures = _failures(values, params, oriented and turned == 0)
+    warnings = _warnings(values, params, sum(volumes[:-1]))
     verdict = "fail" if failures else "warnings" if warnings else "pass"
     return SolidReport(verdict=verdict, failures=failures, warnings=warnings, **values)
 
 
-def _volumes(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> list[float]:
-    """Return the volumes of the connected parts, the largest last; voids, which have none, are left out."""
+def _volumes(vertices: NDArray[np.float64], faces: NDArray[np.int64], drop: float) -> tuple[list[float], int]:
+    """Return the volumes of the connected parts, the largest last, and how many of them are inside out.
+
+    Voids are left out: they are inside out, too, but lie in a part. So are those smaller than a drop from
+    the nozzle, which are as good as nothing.
+    """
     a, b, c = vertices[faces].transpose(1, 0, 2)
-    volumes = np.bincount(bodies(faces), weights=np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0)
-    return [float(volume) for volume in np.sort(volumes[volumes > 0.0])]
+    label = bodies(faces)
+    volumes = np.bincount(label, weights=np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0)
+    turned = [
+        number
+        for number in np.flatnonzero(volumes <= -drop)
+        if winding_number(vertices[faces[label == number][0]].mean(axis=0), vertices, faces[label != number])
+        < 0.5
+    ]
+    found = np.sort(np.concatenate([volumes[volumes > 0.0], -volumes[turned]]))
+    return [float(volume) for volume in found], len(turned)
 
 
-def _failures(values: dict[str, Any], params: PlateParams) -> tuple[str, ...]:
+def _failures(values: dict[str, Any], params: PlateParams, outward: bool) -> tuple[str, ...]:
     failures = []
     if not values["watertight"]:
         failures.append("The mesh is not watertight: there are edges without exactly two faces.")
-    if not values["oriented"]:
+    if not outward:
         failures.append("The faces do not all turn outward.")
     if values["volume_mm3"] <= 0.0:
         failures.append(f"The volume is not positive: {values['volume_mm3']:.3g} mm3.")

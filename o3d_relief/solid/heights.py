@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 import open3d as o3d
@@ -66,6 +68,11 @@ class HeightField:
         rows, columns = self.z.shape
         return f"<HeightField: {columns} x {rows} pixels of {self.mm_per_pixel:g} mm>"
 
+    def __reduce__(
+        self,
+    ) -> tuple[Callable[..., HeightField], tuple[type[HeightField], dict[str, Any]]]:
+        return _restored, (type(self), {item.name: getattr(self, item.name) for item in fields(self)})
+
     @property
     def inside(self) -> NDArray[np.bool_]:
         """(rows, columns) True where the piece is."""
@@ -74,6 +81,10 @@ class HeightField:
     def with_heights(self, z: NDArray[np.float64]) -> HeightField:
         """Return a copy with other heights (rows, columns), NaN where they are not finite."""
         return replace(self, z=np.where(np.isfinite(z), z, np.nan))
+
+
+def _restored(kind: type[HeightField], values: dict[str, Any]) -> HeightField:
+    return kind(**values)
 
 
 def check_pixels(

@@ -18,6 +18,7 @@ __all__ = [
     "quantile",
     "wall_thickness",
     "walls_sampled",
+    "winding_number",
 ]
 
 _MOST_POINTS = 2000
@@ -149,3 +150,38 @@ def quantile(values: NDArray[np.float64], weights: NDArray[np.float64], share: f
     order = np.argsort(values)
     cumulated = np.cumsum(weights[order])
     return float(values[order][np.searchsorted(cumulated, share * cumulated[-1])])
+
+
+def winding_number(
+    point: NDArray[np.float64], vertices: NDArray[np.float64], faces: NDArray[np.int64]
+) -> float:
+    """Count how often closed surfaces go round a point: the solid angles of their faces, over 4 pi.
+
+    Van Oosterom & Strackee, The Solid Angle of a Plane Triangle, 1983.
+
+    Parameters
+    ----------
+    point : (3,) float64
+        On none of the faces.
+    vertices : (n, 3) float64
+    faces : (m, 3) int64
+
+    Returns
+    -------
+    float
+        1 inside of a body, 0 outside and in its voids, but for rounding.
+
+    Examples
+    --------
+    >>> v = np.array([[0, 0, 0], [3, 0, 0], [0, 3, 0], [0, 0, 3.0]])
+    >>> f = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+    >>> [round(winding_number(np.full(3, x), v, f), 6) + 0.0 for x in (0.5, 2.0)]
+    [1.0, 0.0]
+    """
+    a, b, c = (vertices - point)[faces].transpose(1, 0, 2)
+    la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
+    over = np.einsum("ij,ij->i", a, np.cross(b, c))
+    under = la * lb * lc + sum(
+        np.einsum("ij,ij->i", one, two) * length for one, two, length in ((a, b, lc), (b, c, la), (c, a, lb))
+    )
+    return float(np.arctan2(over, under).sum()) / (2.0 * np.pi)

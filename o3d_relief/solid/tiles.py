@@ -79,13 +79,13 @@ class Tiling:
     def __post_init__(self) -> None:
         object.__setattr__(self, "counts", MappingProxyType(dict(self.counts)))
 
-    def __reduce__(self) -> tuple[Callable[..., Tiling], tuple[dict[str, Any]]]:
+    def __reduce__(self) -> tuple[Callable[..., Tiling], tuple[type[Tiling], dict[str, Any]]]:
         values = {item.name: getattr(self, item.name) for item in fields(self)}
-        return _restored, (values | {"counts": dict(self.counts)},)
+        return _restored, (type(self), values | {"counts": dict(self.counts)})
 
 
-def _restored(values: dict[str, Any]) -> Tiling:
-    return Tiling(**values)
+def _restored(kind: type[Tiling], values: dict[str, Any]) -> Tiling:
+    return kind(**values)
 
 
 def make_tiles(solid: Solid, params: TileParams) -> Tiling:

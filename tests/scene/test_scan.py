@@ -92,6 +92,13 @@ def test_records_are_all_there_in_order_read_only_and_picklable(scan):
         assert list(again.stages) == STAGES
         assert again.params == scan.params
 
+    class Own(rel.Scan):
+        pass
+
+    own = copy.copy(Own(mesh=scan.mesh, stages=scan.stages, params=scan.params))
+    assert type(own) is Own
+    assert list(own.stages) == STAGES
+
 
 def test_cloud_is_not_changed_and_its_mesh_can_be(points):
     cloud = to_cloud(points[0], normals=points[1])
@@ -357,7 +364,7 @@ class TestRefusals:
         ({"sensor": (1, 2)}, "sensor must be three numbers"),
         ({"remove_ground": 1}, "remove_ground must be True or False"),
         ({"file_normals": "no"}, "file_normals must be True or False"),
-        ({"depth": 14}, "depth must be between 3 and 13"),
+        ({"depth": 14}, "depth must be a whole number between 3 and 13"),
         ({"depth": 8.5}, "depth must be a whole number"),
         ({"max_points": 10}, "max_points must be"),
         ({"outliers": 0}, "outliers must be greater than 0"),

@@ -472,6 +472,10 @@ def test_a_mesh_that_cannot_be_drawn_raises(vertices, faces, message):
     [
         ({"size": (0, 10)}, "size"),
         ({"size": 16}, "size must be two whole numbers"),
+        ({"size": "64"}, r"size must be two whole numbers\. Got '64' instead"),
+        ({"size": np.array(5)}, r"size must be two whole numbers\. Got array\(5\) instead"),
+        ({"size": np.zeros((2, 3))}, "size must be a whole number"),
+        ({"field": [10**400, 0, 0, 0]}, "field must be numbers"),
         ({"supersampling": 0}, "supersampling"),
         ({"direction": (0, 0, 0)}, "direction"),
         ({"light": (np.nan, 0, 0)}, "light"),
@@ -498,6 +502,8 @@ def test_a_mesh_that_cannot_be_drawn_raises(vertices, faces, message):
         ({"bounds": [0, 1]}, r"bounds must have the shape \(2, 3\)"),
         ({"bounds": "all", "plate": True}, "bounds must be numbers"),
         ({"colors": np.full((4, 3), np.nan)}, "colors must be finite"),
+        ({"colors": np.full((4, 3), 1.5)}, r"colors must be finite, from 0 to 1\. Got 1\.5 instead"),
+        ({"background": (255, 255, 255)}, r"background must be finite, from 0 to 1\. Got 255 instead"),
         ({"field": list("abcd")}, "field must be numbers"),
         ({"field": np.zeros(4), "field_range": (1.0, 0.0)}, "the lower one first"),
         ({"field": np.zeros(4), "field_range": (0.0, np.nan)}, "two finite numbers"),
@@ -517,8 +523,15 @@ def test_vertices_that_no_face_uses_may_be_anything(stray):
     colors = np.full((5, 3), 0.5)
     plain = render(make_mesh(SQUARE, faces), size=(24, 24), colors=colors[:4])
     mesh = make_mesh(np.array(vertices), np.array(faces))
-    assert np.array_equal(render(mesh, size=(24, 24), colors=colors), plain)
+    for shade in (0.5, np.nan, 300.0):
+        colors[4] = shade
+        assert np.array_equal(render(mesh, size=(24, 24), colors=colors), plain)
     assert np.array_equal(mesh.vertices[4], stray, equal_nan=True)
+
+
+def test_colors_may_be_beyond_one_by_rounding_errors():
+    plain = render(make_square(), size=(24, 24), colors=np.ones((4, 3)))
+    assert np.array_equal(render(make_square(), size=(24, 24), colors=np.full((4, 3), 1.0 + 1e-9)), plain)
 
 
 def test_sizes_may_be_whole_numbers_of_numpy():

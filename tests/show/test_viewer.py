@@ -100,3 +100,6 @@ def test_a_mesh_that_cannot_be_shown_leaves_no_process(monkeypatch):
     started[-1].kill()
     with pytest.raises(DisplayError, match="ended with an error"):
         broken.wait()
+    broken.close()
+    with pytest.raises(DisplayError, match="ended with an error"):
+        broken.wait()  # closing hides nothing

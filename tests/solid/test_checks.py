@@ -108,7 +108,22 @@ def test_inside_out_fails():
     block = _box([-20, -10, -4], [20, 10, 6])
     block.invert()
     report = check_solid(_solid(block), PARAMS)
-    assert "The volume is not positive" in report.failures[0]
+    assert report.failures[0] == "The faces do not all turn outward."
+    assert "The volume is not positive" in report.failures[1]
+    assert report.bodies == 1
+
+
+def test_a_part_that_is_inside_out_is_no_void():
+    plate, arch = _box([-20, -10, -4], [20, 10, 5]), _box([-20, -10, 5], [-18, -8, 12])
+    body = trimesh.boolean.union([plate, arch], engine="manifold")  # its box reaches round the part in front
+    turned = _box([0, 0, 7], [2, 5, 9])
+    turned.invert()
+    params = PlateParams(width_mm=40, depth_mm=16)
+    report = check_solid(_solid(trimesh.util.concatenate([body, turned])), params)
+    assert report.verdict == "fail"
+    assert report.failures == ("The faces do not all turn outward.",)
+    assert report.bodies == 2
+    assert report.warnings[0].startswith("1 parts touch nothing, 20 mm3 in all")
 
 
 def test_wrong_sizes_fail():

@@ -1,4 +1,6 @@
-from dataclasses import replace
+import copy
+import pickle
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -102,6 +104,21 @@ def plain_of(vertices, faces):
     from o3d_relief.solid.body import manifold_of
 
     return manifold_of(vertices, faces, is_plate=False)
+
+
+def test_pickling_and_copying_keep_the_class_and_arrays_read_only():
+    solid = slab()
+    field = height_field(solid, 2.0)
+    for thing in (solid, field):
+        own = type("Own", (type(thing),), {})(
+            **{item.name: getattr(thing, item.name) for item in fields(thing)}
+        )
+        assert type(copy.copy(own)) is type(own)
+        for again in (pickle.loads(pickle.dumps(thing)), copy.deepcopy(thing)):
+            for item in fields(thing):
+                value, other = getattr(thing, item.name), getattr(again, item.name)
+                np.testing.assert_equal(other, value)
+                assert not isinstance(value, np.ndarray) or not other.flags.writeable
 
 
 def test_with_heights_keeps_everything_else():

@@ -13,7 +13,7 @@ from o3d_relief.solid.body import PLATE_COLOR, Solid
 from o3d_relief.solid.fragments import held
 from o3d_relief.solid.numerals import engraving
 from o3d_relief.solid.plate import pockets
-from o3d_relief.solid.tiles import make_tiles
+from o3d_relief.solid.tiles import Tiling, make_tiles
 from o3d_relief.workshop_params import TileParams
 from slabs import ball_on_slab, plain, plate, slab
 
@@ -79,6 +79,11 @@ def test_tiles_survive_pickling_and_copying(large):
         for one, other in zip(again.tiles, tiling.tiles, strict=True):
             assert (one.number, one.pins) == (other.number, other.pins)
             assert np.array_equal(one.solid.vertices, other.solid.vertices)
+
+    class Own(Tiling):
+        pass
+
+    assert type(copy.copy(Own(tiles=tiling.tiles, pin_mm=4.0, pin_length_mm=4.0))) is Own
 
 
 def test_pins_count_for_the_size_of_a_tile():
