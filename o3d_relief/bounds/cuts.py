@@ -51,9 +51,9 @@ def cut_crossings(
     """
     # Two corners in front of S, one behind.
     side = np.where(z > 0.0, 1, np.where(z < 0.0, -5, 0)).astype(np.int8)
-    among = np.ones(len(faces), dtype=bool) if among is None else among
-    one, two, three = side[faces].T
-    cut = np.flatnonzero((one + two + three == -3) & among)
+    cut = np.arange(len(faces)) if among is None else np.flatnonzero(among)
+    one, two, three = side[faces[cut]].T
+    cut = cut[one + two + three == -3]
     cut = cut[_narrow(vertices[:, :2], faces[cut])]
     if len(cut) == 0:
         return Pairs.join([]), 0

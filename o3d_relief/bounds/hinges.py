@@ -48,6 +48,8 @@ def hinged_pairs(
     >>> len(hinged_pairs(places, np.array([[0, 1, 2], [0, 3, 4]]), pair, turned))
     1
     """
+    if len(pairs) == 0:
+        return pairs
     front = z > 0.0
     one, two, three = front[faces].T
     cut = faces[(one != two) | (two != three)]

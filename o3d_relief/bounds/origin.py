@@ -140,7 +140,7 @@ def triangles_cross(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDA
     (array([ True]), array([False]))
     """
     normals = [_normals(corners) for corners in (one, other)]
-    line = np.cross(normals[0], normals[1])
+    line = _cross(normals[0], normals[1])
     length = np.linalg.norm(line, axis=1, keepdims=True)
     line /= np.where(length > 0.0, length, 1.0)
     middle = other[:, :1]
@@ -190,9 +190,15 @@ def triangles_overlap(one: NDArray[np.float64], other: NDArray[np.float64]) -> N
     return np.asarray(~apart)
 
 
+def _cross(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the cross products of vectors, (q, 3) each; np.cross takes three times as long for few."""
+    (a, b, c), (d, e, f) = one.T, other.T
+    return np.stack([b * f - c * e, c * d - a * f, a * e - b * d], axis=1)
+
+
 def _normals(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the unit normals of triangles, 0 for those without an area."""
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = _cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     size = np.linalg.norm(normal, axis=1, keepdims=True)
     return np.asarray(normal / np.where(size > 0.0, size, 1.0))
 
