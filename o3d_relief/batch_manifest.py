@@ -128,6 +128,10 @@ class Manifest:
         self.entries: dict[str, BatchEntry] = {}
         for entry in _lines(self._path):
             self.entries[entry.input] = entry
+        if self.entries:
+            self._append(
+                ""
+            )  # another user's may not be for us to write: said now, not after the first relief
         if _read_notes(*_places(folder)):
             self.settle()
         for place in _places(folder):  # from here on, notes are those of this batch
@@ -137,8 +141,14 @@ class Manifest:
     def add(self, entry: BatchEntry) -> None:
         """Add what became of an input."""
         self.entries[entry.input] = entry
-        with self._path.open("a", encoding="utf-8", newline="\n") as file:
-            file.write(entry.line())
+        self._append(entry.line())
+
+    def _append(self, text: str) -> None:
+        try:
+            with self._path.open("a", encoding="utf-8", newline="\n") as file:
+                file.write(text)
+        except OSError as error:
+            raise FileError(f"{self._path} cannot be written: {error.strerror}.") from error
 
     def settle(self, order: Iterable[str] = ()) -> None:
         """Write the manifest anew, one line for each input, with what only the notes say; remove these.

@@ -1,9 +1,10 @@
 import dataclasses
+from pathlib import Path
 
 import pytest
 
 from o3d_relief.batch_entry import BatchEntry
-from o3d_relief.batch_manifest import Manifest, Notes
+from o3d_relief.batch_manifest import MANIFEST, Manifest, Notes
 from o3d_relief.errors import FileError
 
 
@@ -95,4 +96,18 @@ def test_a_line_with_another_certificate_is_named(tmp_path, made_entry):
     wrong = dataclasses.replace(made_entry, certificate={"failures": None})
     (tmp_path / "manifest.jsonl").write_text(made_entry.line() + wrong.line())
     with pytest.raises(FileError, match=r"manifest\.jsonl .*line 2"):
+        Manifest(tmp_path)
+
+
+def test_a_manifest_that_cannot_be_written_is_told_before_the_work(tmp_path, monkeypatch):
+    Manifest(tmp_path).add(failed("a"))
+    opened = Path.open
+
+    def refuse(path, mode="r", *more, **options):
+        if path.name == MANIFEST and mode == "a":
+            raise PermissionError(13, "Permission denied")
+        return opened(path, mode, *more, **options)
+
+    monkeypatch.setattr(Path, "open", refuse)  # as another user's file is; root may write everything
+    with pytest.raises(FileError, match=r"manifest\.jsonl cannot be written: Permission denied"):
         Manifest(tmp_path)
