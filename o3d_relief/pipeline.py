@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from types import MappingProxyType
-
 import numpy as np
 import open3d as o3d
 import scipy.sparse as sp
@@ -137,7 +135,7 @@ def make_relief(
         mesh=relief_mesh,
         to_scene=frame.to_scene,
         source_index=trimmed.source_index,
-        stages=MappingProxyType(journal.stages),
+        stages=journal.stages,
         params=params,
         view=view,
         trimmed=trimmed,

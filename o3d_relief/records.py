@@ -7,13 +7,14 @@ clusters, p <= k of attenuation points, n_in of input vertices.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
-from types import MappingProxyType
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from o3d_relief.frozen import Frozen
 
 __all__ = [
     "AttenuationStage",
@@ -33,7 +34,7 @@ __all__ = [
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class StageRecord:
+class StageRecord(Frozen):
     """What every stage tells: its wall time and the counts of what it had to settle.
 
     Attributes
@@ -50,25 +51,8 @@ class StageRecord:
     seconds: float = 0.0
     counts: Mapping[str, int] = field(default_factory=dict)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "counts", MappingProxyType(dict(self.counts)))
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if isinstance(value, np.ndarray):
-                frozen = value.view()  # the caller's own array stays as it is
-                frozen.flags.writeable = False
-                object.__setattr__(self, item.name, frozen)
-
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self.seconds:.3f} s, {dict(self.counts)}>"
-
-    def __reduce__(self) -> tuple[Callable[..., StageRecord], tuple[type[StageRecord], dict[str, Any]]]:
-        values = {item.name: getattr(self, item.name) for item in fields(self)}
-        return _restored, (type(self), values | {"counts": dict(self.counts)})
-
-
-def _restored(kind: type[StageRecord], values: dict[str, Any]) -> StageRecord:
-    return kind(**values)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from functools import cached_property
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-import open3d as o3d
 from numpy.typing import NDArray
 
 from o3d_relief.bounds.certificate import Certificate, certify
 from o3d_relief.params import ReliefParams, View
 from o3d_relief.records import StageRecord, final_heights
 from o3d_relief.scan_params import ScanParams
-from o3d_relief.scene.packed import PackedMesh
+from o3d_relief.scene.packed import MeshRecord
 from o3d_relief.scene.weld import weld
 from o3d_relief.stages.trim import Trimmed
 
@@ -24,7 +22,7 @@ __all__ = ["Relief"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Relief:
+class Relief(MeshRecord):
     """A high relief and how it came about.
 
     It can be pickled, for the same version of this package, and copied, which Open3D's meshes cannot.
@@ -51,7 +49,6 @@ class Relief:
         How the point cloud was meshed, if it was one.
     """
 
-    mesh: o3d.geometry.TriangleMesh
     to_scene: NDArray[np.float64]
     source_index: NDArray[np.int64]
     stages: Mapping[str, StageRecord]
@@ -60,23 +57,12 @@ class Relief:
     trimmed: Trimmed
     scan: ScanParams | None = None
 
-    def __post_init__(self) -> None:
-        self.to_scene.flags.writeable = False
-        self.source_index.flags.writeable = False
-
     def __repr__(self) -> str:
         depth = float(np.asarray(self.mesh.vertices)[:, 2].max())
         return (
             f"<Relief: {len(self.mesh.vertices)} vertices, {len(self.mesh.triangles)} triangles, "
             f"{depth:.4g} deep, stages {', '.join(self.stages)}>"
         )
-
-    def __reduce__(
-        self,
-    ) -> tuple[Callable[..., Relief], tuple[type[Relief], PackedMesh, dict[str, Any], Any]]:
-        values = {item.name: getattr(self, item.name) for item in fields(self) if item.name != "mesh"}
-        values["stages"] = dict(self.stages)
-        return _restored, (type(self), PackedMesh.of(self.mesh), values, vars(self).get("certificate"))
 
     def _repr_png_(self) -> bytes:
         """Show the relief in a notebook: a sheet of views."""
@@ -149,12 +135,3 @@ class Relief:
                 for name, record in self.stages.items()
             },
         }
-
-
-def _restored(
-    kind: type[Relief], mesh: PackedMesh, values: dict[str, Any], certificate: Certificate | None
-) -> Relief:
-    relief = kind(mesh=mesh.mesh(), **values | {"stages": MappingProxyType(values["stages"])})
-    if certificate is not None:
-        vars(relief)["certificate"] = certificate
-    return relief

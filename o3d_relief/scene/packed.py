@@ -1,14 +1,18 @@
-"""Open3D meshes as plain arrays that can be pickled and copied: Open3D's own cannot."""
+"""Open3D meshes, and records that hold one, pickled and copied as plain arrays: Open3D's own cannot be."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
-__all__ = ["PackedMesh"]
+from o3d_relief.frozen import Frozen
+
+__all__ = ["MeshRecord", "PackedMesh"]
 
 _KINDS = {
     "vertices": o3d.utility.Vector3dVector,
@@ -69,3 +73,26 @@ class PackedMesh:
                 for pixels in self.textures
             ]
         return result
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class MeshRecord(Frozen):
+    """Base of records that hold an Open3D mesh, pickled and copied with all that was computed of them.
+
+    Attributes
+    ----------
+    mesh : open3d.geometry.TriangleMesh
+    """
+
+    mesh: o3d.geometry.TriangleMesh
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        _, (kind, values) = super().__reduce__()
+        computed = {name: value for name, value in vars(self).items() if name not in values}
+        return _made_again, (kind, values | {"mesh": PackedMesh.of(self.mesh)}, computed)
+
+
+def _made_again(kind: type, values: dict[str, Any], computed: dict[str, Any]) -> object:
+    record = kind(**values | {"mesh": values["mesh"].mesh()})
+    vars(record).update(computed)
+    return record

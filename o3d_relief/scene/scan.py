@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
-from types import MappingProxyType
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import open3d as o3d
 
@@ -18,13 +16,13 @@ from o3d_relief.scan.steps import ground_step, normals_step, orientation_step, o
 from o3d_relief.scan.surface_steps import parts_step, skin_step, surface_step
 from o3d_relief.scan_params import ScanParams
 from o3d_relief.scene.arrays import MeshArrays, cloud_arrays, to_open3d
-from o3d_relief.scene.packed import PackedMesh
+from o3d_relief.scene.packed import MeshRecord
 
 __all__ = ["Scan", "mesh_from_points", "scan_points"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Scan:
+class Scan(MeshRecord):
     """The mesh of a point cloud and how it came about.
 
     It can be pickled, for the same version of this package, and copied.
@@ -38,7 +36,6 @@ class Scan:
     params : ScanParams
     """
 
-    mesh: o3d.geometry.TriangleMesh
     stages: Mapping[str, StageRecord]
     params: ScanParams
 
@@ -47,14 +44,6 @@ class Scan:
             f"<Scan: {len(self.mesh.vertices)} vertices, {len(self.mesh.triangles)} triangles, "
             f"stages {', '.join(self.stages)}>"
         )
-
-    def __reduce__(self) -> tuple[Callable[..., Scan], tuple[type[Scan], PackedMesh, dict[str, Any]]]:
-        values = {item.name: getattr(self, item.name) for item in fields(self) if item.name != "mesh"}
-        return _restored, (type(self), PackedMesh.of(self.mesh), values | {"stages": dict(self.stages)})
-
-
-def _restored(kind: type[Scan], mesh: PackedMesh, values: dict[str, Any]) -> Scan:
-    return kind(**values | {"mesh": mesh.mesh(), "stages": MappingProxyType(values["stages"])})
 
 
 def scan_points(
@@ -126,7 +115,7 @@ def scan_points(
     journal.begin("parts")
     parts = journal.keep(parts_step(points, oriented, skin, params))
     mesh = to_open3d(MeshArrays(vertices=parts.vertices, faces=parts.faces, colors=parts.colors))
-    return Scan(mesh=mesh, stages=MappingProxyType(journal.stages), params=params)
+    return Scan(mesh=mesh, stages=journal.stages, params=params)
 
 
 def mesh_from_points(

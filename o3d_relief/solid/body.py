@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from o3d_relief.errors import MeshError
+from o3d_relief.frozen import Frozen
 
 if TYPE_CHECKING:
     import manifold3d
@@ -23,7 +23,7 @@ PLATE_COLOR = (0.8, 0.79, 0.77)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Solid:
+class Solid(Frozen):
     """A closed triangle mesh in millimetres.
 
     It lies in the relief's frame: x to the right, y up, z to the viewer. The relief plane is z = 0, the
@@ -50,22 +50,9 @@ class Solid:
     is_plate: NDArray[np.bool_]
     counts: Mapping[str, float] = field(default_factory=dict)
 
-    def __post_init__(self) -> None:
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if isinstance(value, np.ndarray):
-                frozen = value.view()  # the caller's own array stays as it is
-                frozen.flags.writeable = False
-                object.__setattr__(self, item.name, frozen)
-        object.__setattr__(self, "counts", MappingProxyType(dict(self.counts)))
-
     def __repr__(self) -> str:
         x, y, z = self.size
         return f"<Solid: {len(self.faces)} triangles, {x:.2f} x {y:.2f} x {z:.2f} mm>"
-
-    def __reduce__(self) -> tuple[Callable[..., Solid], tuple[type[Solid], dict[str, Any]]]:
-        values = {item.name: getattr(self, item.name) for item in fields(self)}
-        return _restored, (type(self), values | {"counts": dict(self.counts)})
 
     @property
     def size(self) -> NDArray[np.float64]:
@@ -183,10 +170,6 @@ class Solid:
             colors = np.empty((len(used), 3))
             colors[index[order]] = np.clip(properties[order, 3:6], 0.0, 1.0)
         return cls(vertices=properties[used, :3], faces=index[corners], colors=colors, is_plate=is_plate)
-
-
-def _restored(kind: type[Solid], values: dict[str, Any]) -> Solid:
-    return kind(**values)
 
 
 def manifold_of(

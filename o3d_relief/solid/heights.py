@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
 from o3d_relief.errors import ParameterError
+from o3d_relief.frozen import Frozen
 from o3d_relief.limits import check_field
 from o3d_relief.param_checks import check_kind, check_positive
 from o3d_relief.rays import unit_box
@@ -24,7 +23,7 @@ _BESIDE = ((1e-6, 1e-6), (-1e-6, 1e-6), (-1e-6, -1e-6), (1e-6, -1e-6))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class HeightField:
+class HeightField(Frozen):
     """Heights on a grid of square pixels, seen from the front.
 
     Row 0 is the top. The centre of pixel (i, j) lies at x = left + (j + 1/2) mm_per_pixel,
@@ -56,22 +55,9 @@ class HeightField:
     back: float
     highest: float
 
-    def __post_init__(self) -> None:
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if isinstance(value, np.ndarray):
-                frozen = value.view()  # the caller's own array stays as it is
-                frozen.flags.writeable = False
-                object.__setattr__(self, item.name, frozen)
-
     def __repr__(self) -> str:
         rows, columns = self.z.shape
         return f"<HeightField: {columns} x {rows} pixels of {self.mm_per_pixel:g} mm>"
-
-    def __reduce__(
-        self,
-    ) -> tuple[Callable[..., HeightField], tuple[type[HeightField], dict[str, Any]]]:
-        return _restored, (type(self), {item.name: getattr(self, item.name) for item in fields(self)})
 
     @property
     def inside(self) -> NDArray[np.bool_]:
@@ -81,10 +67,6 @@ class HeightField:
     def with_heights(self, z: NDArray[np.float64]) -> HeightField:
         """Return a copy with other heights (rows, columns), NaN where they are not finite."""
         return replace(self, z=np.where(np.isfinite(z), z, np.nan))
-
-
-def _restored(kind: type[HeightField], values: dict[str, Any]) -> HeightField:
-    return kind(**values)
 
 
 def check_pixels(

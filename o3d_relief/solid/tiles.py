@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from o3d_relief.errors import ParameterError
+from o3d_relief.frozen import Frozen
 from o3d_relief.param_checks import check_kind
 from o3d_relief.solid.body import Solid
 from o3d_relief.solid.fragments import held
@@ -57,7 +57,7 @@ class Tile:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Tiling:
+class Tiling(Frozen):
     """A solid cut into tiles.
 
     Attributes
@@ -75,17 +75,6 @@ class Tiling:
     pin_mm: float
     pin_length_mm: float
     counts: Mapping[str, int] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "counts", MappingProxyType(dict(self.counts)))
-
-    def __reduce__(self) -> tuple[Callable[..., Tiling], tuple[type[Tiling], dict[str, Any]]]:
-        values = {item.name: getattr(self, item.name) for item in fields(self)}
-        return _restored, (type(self), values | {"counts": dict(self.counts)})
-
-
-def _restored(kind: type[Tiling], values: dict[str, Any]) -> Tiling:
-    return kind(**values)
 
 
 def make_tiles(solid: Solid, params: TileParams) -> Tiling:
