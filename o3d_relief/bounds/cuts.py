@@ -45,7 +45,7 @@ def cut_crossings(
     Returns
     -------
     pairs : Pairs
-        Two for each of them, in the order of before, and those next to them that are about to follow.
+        As `new_crossings` returns them.
     count : int
         Number of crossings.
     """

@@ -24,9 +24,6 @@ _FEW = 30
 """So many crossings at most are looked at together with what is next to them: of more, it takes longer than
 the rounds that it saves."""
 
-_CLOSE = 0.02
-"""Gap in relief units below which surfaces next to a crossing are about to cross, too."""
-
 
 def new_crossings(
     vertices: NDArray[np.float64],
@@ -48,7 +45,7 @@ def new_crossings(
     Returns
     -------
     pairs : Pairs
-        Two for each of them, in the order of before, and those next to them that are about to follow.
+        Two for each of them, in the order of before, and those next to them that are out of order, too.
     count : int
         Number of crossings.
     """
@@ -68,8 +65,7 @@ def new_crossings(
     beside = around(found, vertices, faces)
     beside = beside.select(~beside.pierced(before) & (np.abs(beside.gaps(before)).max(axis=1) > DEEP))
     close = beside.pairs(before, z)
-    gap = np.subtract(*close.heights(z))
-    return Pairs.join([pairs, close.select(gap < np.minimum(_CLOSE, close.gap / 4.0))]), len(found)
+    return Pairs.join([pairs, close.select(np.subtract(*close.heights(z)) < 0.0)]), len(found)
 
 
 def around(
