@@ -128,10 +128,8 @@ class Manifest:
         self.entries: dict[str, BatchEntry] = {}
         for entry in _lines(self._path):
             self.entries[entry.input] = entry
-        if self.entries:
-            self._append(
-                ""
-            )  # another user's may not be for us to write: said now, not after the first relief
+        if self._path.exists():
+            self._append("")  # another user's may not be ours to write: now, not after the first relief
         if _read_notes(*_places(folder)):
             self.settle()
         for place in _places(folder):  # from here on, notes are those of this batch

@@ -22,7 +22,10 @@ if TYPE_CHECKING:
     from open3d.geometry import PointCloud, TriangleMesh
 
     from o3d_relief.making import Made
+    from o3d_relief.params import ReliefParams, View
+    from o3d_relief.plate_params import PlateParams
     from o3d_relief.relief import Relief
+    from o3d_relief.workshop_params import MillParams
 
 __all__ = ["make", "read_scene"]
 
@@ -52,13 +55,11 @@ def make(options: argparse.Namespace) -> int:
     taken = _check_places(options)
     tell_unused(params)
 
-    from o3d_relief.making import check_mill, make_checked, tell_estimate
+    from o3d_relief.making import make_checked
     from o3d_relief.pipeline import make_relief
     from o3d_relief.progress_bar import StageBar
-    from o3d_relief.rehearsal import check_scene
     from o3d_relief.scene.scan import scan_points
     from o3d_relief.scene.write import lost_attributes
-    from o3d_relief.solid.estimate import relief_depth
 
     _check_endings(options, solid=plate is not None)
     started = time.perf_counter()
@@ -73,15 +74,10 @@ def make(options: argparse.Namespace) -> int:
             # Its size must be known before the relief is made.
             scanned = scan_points(scene, meshing, view=view, on_stage=tell_stage, on_progress=bar)
             scene, meshing = scanned.mesh, None
-        if plate is not None and plate.depth_mm is not None:
-            depth = relief_depth(scene, view, plate, max_triangles=options.max_triangles)
-            params = replace(params, depth=depth)
-        most, free = options.max_triangles, options.undercut_free
-        if plate is not None and mill is not None:
-            check_mill(scene, view, plate, mill, undercut_free=free, max_triangles=most)
+        if plate is not None:
+            params = _fitted(options, scene, params, view, plate, mill)
         if options.dry_run:
-            check_scene(scene, params, view, most, solid=plate is not None)
-            tell_estimate(scene, params, view, plate, tell, mill=mill, undercut_free=free, max_triangles=most)
+            _rehearse(options, scene, params, view, plate, mill)
             return 0
         relief = make_relief(
             scene if scanned is None else scanned,
@@ -90,7 +86,7 @@ def make(options: argparse.Namespace) -> int:
             scan=meshing,
             on_stage=tell_stage,
             on_progress=bar,
-            max_triangles=most,
+            max_triangles=options.max_triangles,
         )
         made = None
         if plate is not None:
@@ -99,7 +95,7 @@ def make(options: argparse.Namespace) -> int:
                 plate,
                 lambda line: tell(as_options(line, vars(options))),
                 mill=mill,
-                undercut_free=free,
+                undercut_free=options.undercut_free,
                 tiles=tiles,
                 on_progress=bar,
             )
@@ -110,6 +106,43 @@ def make(options: argparse.Namespace) -> int:
     solids = _write(options, relief, made, taken)
     tell_result(options.output, relief, time.perf_counter() - started, solids=solids)
     return 3 if options.strict and made is not None and made.report.verdict != "pass" else 0
+
+
+def _fitted(
+    options: argparse.Namespace,
+    scene: TriangleMesh,
+    params: ReliefParams,
+    view: View,
+    plate: PlateParams,
+    mill: MillParams | None,
+) -> ReliefParams:
+    """Return parameters with the depth that makes the solid as deep as asked for; refuse too many pixels."""
+    from o3d_relief.making import check_mill
+    from o3d_relief.solid.estimate import relief_depth
+
+    most = options.max_triangles
+    if mill is not None:
+        check_mill(scene, view, plate, mill, undercut_free=options.undercut_free, max_triangles=most)
+    if plate.depth_mm is None:
+        return params
+    return replace(params, depth=relief_depth(scene, view, plate, max_triangles=most))
+
+
+def _rehearse(
+    options: argparse.Namespace,
+    scene: TriangleMesh,
+    params: ReliefParams,
+    view: View,
+    plate: PlateParams | None,
+    mill: MillParams | None,
+) -> None:
+    """Go as far as can be told without the long work, and say what would come of it."""
+    from o3d_relief.making import tell_estimate
+    from o3d_relief.rehearsal import check_scene
+
+    most, free = options.max_triangles, options.undercut_free
+    check_scene(scene, params, view, most, solid=plate is not None)
+    tell_estimate(scene, params, view, plate, tell, mill=mill, undercut_free=free, max_triangles=most)
 
 
 def _write(options: argparse.Namespace, relief: Relief, made: Made | None, taken: set[Path]) -> list[Path]:

@@ -15,18 +15,7 @@ from o3d_relief.show.render import render
 from o3d_relief.show.sheets import stage_picture
 from stage_records import make_stages
 
-NAMES = [
-    "scene",
-    "perspective",
-    "visibility",
-    "clusters",
-    "attenuation",
-    "construction",
-    "restoration",
-    "order",
-    "compression",
-    "trim",
-]
+NAMES = list(make_stages())
 SIZE = (168, 80)
 
 
