@@ -155,8 +155,6 @@ def main() -> None:
     save(folder / "vanishing_point.jpg", views(perspectives, 0))
     figure(folder / "bas_relief.jpg", "figure_12_bas_relief")
     figure(folder / "gallery.jpg", "figure_13_gallery")
-    figure(folder / "restoration.jpg", "figure_09_restoration")
-    figure(folder / "bounded.jpg", "bounded_depths")
     save(folder / "milling.jpg", milling(rel.make_solid(make(), rel.PlateParams(width_mm=150, depth_mm=29))))
     large = rel.PlateParams(width_mm=260, depth_mm=48, base_mm=8)
     save(folder / "tiles.jpg", tiles(rel.make_solid(make(), large)))
