@@ -8,6 +8,7 @@ from pathlib import Path
 
 from o3d_relief.batch_entry import BatchEntry
 from o3d_relief.errors import FileError, ParameterError
+from o3d_relief.param_checks import told
 
 __all__ = ["find_inputs", "output_names"]
 
@@ -39,7 +40,7 @@ def find_inputs(inputs: Iterable[str | Path]) -> list[str]:
     except TypeError:
         places = []
     if not places:
-        raise ParameterError(f"inputs must be a sequence of files, at least one. Got {inputs!r} instead.")
+        raise ParameterError(f"inputs must be a sequence of files, at least one. Got {told(inputs)} instead.")
     # Path.exists would raise for names that are too long.
     if not any(os.path.exists(place) for place in places):  # noqa: PTH110
         rest = "" if len(places) == 1 else ", nor is any other of the inputs there"

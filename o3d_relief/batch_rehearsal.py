@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -48,14 +48,14 @@ class Rehearsal:
         return self.estimate is None and self.error is None
 
 
-def rehearse_reliefs(inputs: Sequence[str | Path], out: str | Path, recipe: Recipe) -> Iterator[Rehearsal]:
+def rehearse_reliefs(inputs: Iterable[str | Path], out: str | Path, recipe: Recipe) -> Iterator[Rehearsal]:
     """Go through the inputs of a batch up to its long work, one after the other.
 
     Point clouds are meshed: their sizes are not known before. What certificates would refuse is not.
 
     Parameters
     ----------
-    inputs : sequence of path
+    inputs : iterable of path
         As in `make_reliefs`.
     out : path
     recipe : Recipe
